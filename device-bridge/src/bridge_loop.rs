@@ -15,7 +15,7 @@ use crate::device::DeviceFault;
 use crate::edge::{BrokenSet, EdgeCoupler, PassedWrench};
 use crate::external::ExternalWrenchStatistics;
 use crate::own_stamps::OwnStamps;
-use crate::port::{Command, CommandSource, DevicePort, Events, Passivity, Spell};
+use crate::port::{Command, CommandSource, DevicePort, EdgeDetector, Events, Passivity};
 use crate::report::Durations;
 
 /// The newest command, and when the device was read for what it comes from.
@@ -71,7 +71,7 @@ pub struct BridgeLoop {
     unkept: bool,
     /// Number of the set that was refused last.
     refused: Option<u64>,
-    refusals: Spell,
+    refusals: EdgeDetector,
 }
 
 impl BridgeLoop {
@@ -103,7 +103,7 @@ impl BridgeLoop {
             newest: None,
             edge: None,
             refused: None,
-            refusals: Spell::default(),
+            refusals: EdgeDetector::default(),
         }
     }
 
@@ -386,16 +386,16 @@ mod tests {
         for tick in 1..=1000 {
             let _ = bridge.tick(ms(tick), session(tick), Some(at_once(tick, 5.0)));
         }
-        let mut told = Vec::new();
+        let mut events = Vec::new();
         for tick in 1001..=1300 {
             let output = bridge.tick(ms(tick), session(tick), Some(at_once(1000, 5.0)));
-            told.extend(output.events.iter().copied());
+            events.extend(output.events.iter().copied());
             let felt = bridge.port().rendered().norm();
             // 5 ms before the promise: the margin for a loop that is late.
             assert_eq!(felt == 0.0, tick >= 1115, "{felt} N at {tick} ms");
         }
-        let told: Vec<_> = told.iter().map(|e| (e.kind, e.time, e.value)).collect();
-        assert_eq!(told, [(EventKind::ForceStale, ms(1021), 0.021)]);
+        let events: Vec<_> = events.iter().map(|e| (e.kind, e.time, e.value)).collect();
+        assert_eq!(events, [(EventKind::ForceStale, ms(1021), 0.021)]);
     }
 
     #[test]
@@ -443,11 +443,11 @@ mod tests {
                 .iter()
                 .all(|output| output.input.flags == INPUT_FAULT)
         );
-        let told: Vec<_> = outputs
+        let events: Vec<_> = outputs
             .iter()
             .flat_map(|output| output.events.iter().map(|event| event.kind))
             .collect();
-        assert_eq!(told, [EventKind::DeviceEnded]);
+        assert_eq!(events, [EventKind::DeviceEnded]);
         assert_eq!(bridge.fault(), Some(DeviceFault::Ended));
         // The last good pose goes on being sent, flagged.
         assert_eq!(outputs[19].input.pose.position[2], 0.01);
@@ -479,7 +479,7 @@ mod tests {
         let edge = EdgeCoupler::new(&offer()).expect("an offer");
         bridge.begin_session(CommandSource::Other, Some(edge));
         let _ = bridge.tick(ms(1), session(1), None);
-        let mut told = Vec::new();
+        let mut events = Vec::new();
         // A good set, twenty broken ones in three ticks each, a pause, and another broken one.
         for tick in 2..400 {
             let number = match tick {
@@ -493,30 +493,30 @@ mod tests {
                 set.rows[0].normal = [0.0, 0.0, 0.5];
             }
             let refused = bridge.take_set(&set, ms(tick), session(tick));
-            told.extend(refused.map(|broken| (tick, broken)));
+            events.extend(refused.map(|broken| (tick, broken)));
         }
         let normal = BrokenSet::Normal;
-        assert_eq!(told, [(3, normal), (300, normal)]);
+        assert_eq!(events, [(3, normal), (300, normal)]);
         assert_eq!((bridge.stats().sets, bridge.stats().broken_sets), (1, 21));
     }
 
     /// Force that is felt, N, when every command comes from a reading that is `age` old, ms.
     fn felt_at(mut age: impl FnMut(u64) -> u64, ticks: u64) -> (Vec<f64>, Vec<EventKind>, u128) {
         let mut bridge = bridge(simulated());
-        let (mut felt, mut told) = (Vec::new(), Vec::new());
+        let (mut felt, mut events) = (Vec::new(), Vec::new());
         for tick in 1..=ticks {
             let command = push(tick, 5.0, tick.saturating_sub(age(tick)));
             let output = bridge.tick(ms(tick), session(tick), Some(command));
-            told.extend(output.events.iter().map(|event| event.kind));
+            events.extend(output.events.iter().map(|event| event.kind));
             felt.push(bridge.port().rendered().norm());
         }
-        (felt, told, bridge.stats().max_force_age.as_millis())
+        (felt, events, bridge.stats().max_force_age.as_millis())
     }
 
     #[test]
     fn a_delay_that_grows_under_new_commands_is_felt_no_longer_than_a_silence() {
         let growing = |tick: u64| 2 + tick.saturating_sub(1000) / 10;
-        let (felt, told, oldest) = felt_at(growing, 3000);
+        let (felt, events, oldest) = felt_at(growing, 3000);
         assert!((felt[999] - 5.0).abs() < 1e-12);
         // 20 ms old after 180 ms; then the fade of a silence, which does not wait for the delay.
         let last = felt
@@ -525,7 +525,7 @@ mod tests {
             .expect("a force");
         assert!((1180..1300).contains(&last), "{last}");
         assert!(oldest < 120, "{oldest} ms");
-        assert!(told.contains(&EventKind::ForceStale), "{told:?}");
+        assert!(events.contains(&EventKind::ForceStale), "{events:?}");
     }
 
     #[test]

@@ -65,6 +65,13 @@ impl<T: FarEnd> PseudoTerminal<T> {
         })
     }
 
+    /// Where people find it: its link, or else the terminal itself.
+    #[must_use]
+    pub fn place(&self) -> String {
+        let link = self.link.as_ref().map(|link| link.display().to_string());
+        link.unwrap_or_else(|| self.path.clone())
+    }
+
     /// Of the terminal.
     #[must_use]
     pub fn path(&self) -> &str {

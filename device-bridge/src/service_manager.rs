@@ -75,12 +75,12 @@ impl Turns {
 
 /// The thread that tells. When this goes, the manager hears that the service stops.
 #[derive(Debug)]
-pub struct Teller {
+pub struct ServiceNotifier {
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Teller {
+impl ServiceNotifier {
     /// As [`run`], in a thread of its own, until `is_over` or until this is dropped; `None` where there is nobody to tell.
     pub fn start<const N: usize>(
         status: &'static str,
@@ -113,7 +113,7 @@ impl Teller {
     }
 }
 
-impl Drop for Teller {
+impl Drop for ServiceNotifier {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {

@@ -232,6 +232,15 @@ fn play(args: &SimulateArgs) -> Result<PlayedReport, SimulateError> {
     }
 }
 
+/// Says where the device is, and lets it play until it is over.
+fn play_until(over: impl Fn() -> bool, place: String) -> Result<(), SimulateError> {
+    console::print(place).map_err(SimulateError::Output)?;
+    while !over() {
+        thread::sleep(LOOK);
+    }
+    Ok(())
+}
+
 fn play_haply(args: &PlayedHaply, over: impl Fn() -> bool) -> Result<PlayedReport, SimulateError> {
     let settings = SimulatedSettings {
         path: args.hand.path()?,
@@ -244,15 +253,14 @@ fn play_haply(args: &PlayedHaply, over: impl Fn() -> bool) -> Result<PlayedRepor
         address: args.bind,
         cause,
     })?;
-    let told = console::print(format!(
-        "a simulated Inverse service listens at {}; read it by: taut bridge --device haply={}",
-        service.address(),
-        service.address()
-    ));
-    told.map_err(SimulateError::Output)?;
-    while !over() {
-        thread::sleep(LOOK);
-    }
+    play_until(
+        over,
+        format!(
+            "a simulated Inverse service listens at {}; read it by: taut bridge --device haply={}",
+            service.address(),
+            service.address()
+        ),
+    )?;
     let totals = service.totals();
     Ok(PlayedReport::Haply {
         sessions: totals.sessions,
@@ -280,17 +288,13 @@ fn play_spidar(
     )?;
     let terminal = PseudoTerminal::start(boards, args.link.as_deref());
     let terminal = terminal.map_err(SimulateError::Terminal)?;
-    let path = args.link.as_ref().map_or_else(
-        || terminal.path().to_owned(),
-        |link| link.display().to_string(),
-    );
-    let told = console::print(format!(
-        "simulated motor boards are at {path}; read them by: taut bridge --device spidar:{path}"
-    ));
-    told.map_err(SimulateError::Output)?;
-    while !over() {
-        thread::sleep(LOOK);
-    }
+    let path = terminal.place();
+    play_until(
+        over,
+        format!(
+            "simulated motor boards are at {path}; read them by: taut bridge --device spidar:{path}"
+        ),
+    )?;
     let boards = terminal.device();
     Ok(PlayedReport::Spidar {
         cycles: boards.cycles(),
@@ -310,17 +314,13 @@ fn play_polhem(
     let arm = SimulatedPolhem::new(args.hand.hand.into(), args.hand.path()?, Some(tremor));
     let terminal = PseudoTerminal::start(arm, args.link.as_deref());
     let terminal = terminal.map_err(SimulateError::Terminal)?;
-    let path = args.link.as_ref().map_or_else(
-        || terminal.path().to_owned(),
-        |link| link.display().to_string(),
-    );
-    let told = console::print(format!(
-        "a simulated Polhem board is at {path}; read it by: taut bridge --device polhem:{path}"
-    ));
-    told.map_err(SimulateError::Output)?;
-    while !over() {
-        thread::sleep(LOOK);
-    }
+    let path = terminal.place();
+    play_until(
+        over,
+        format!(
+            "a simulated Polhem board is at {path}; read it by: taut bridge --device polhem:{path}"
+        ),
+    )?;
     let arm = terminal.device();
     Ok(PlayedReport::Polhem {
         lines: arm.lines(),
@@ -352,13 +352,12 @@ fn play_wooden(
         cause,
     })?;
     let (path, name) = (args.socket.display(), model.name);
-    let told = console::print(format!(
-        "a simulated {name} is at {path}; read it by: taut bridge --device wooden={path},model={name}"
-    ));
-    told.map_err(SimulateError::Output)?;
-    while !over() {
-        thread::sleep(LOOK);
-    }
+    play_until(
+        over,
+        format!(
+            "a simulated {name} is at {path}; read it by: taut bridge --device wooden={path},model={name}"
+        ),
+    )?;
     let arm = service.arm();
     Ok(PlayedReport::Wooden {
         reports: arm.reports(),

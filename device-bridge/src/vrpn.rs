@@ -216,12 +216,12 @@ impl Listener {
     /// Calls, listens, and calls again; never returns.
     async fn run(mut self) {
         let mut pause = BACK_OFF.0;
-        let mut told = String::new();
+        let mut last_text = String::new();
         loop {
             let error = match self.call().await {
                 Ok(connection) => {
                     tracing::info!("listening to the tracker {}", self.source.address);
-                    (pause, told) = (BACK_OFF.0, String::new());
+                    (pause, last_text) = (BACK_OFF.0, String::new());
                     self.set_connected(true);
                     let Err(error) = self.listen(connection).await;
                     self.set_connected(false);
@@ -231,12 +231,12 @@ impl Listener {
             };
             // A server that stays away is told of once.
             let text = error.to_string();
-            if text != told {
+            if text != last_text {
                 tracing::warn!(
                     "no tracker {}: {text}; trying again until it is there",
                     self.source.address
                 );
-                told = text;
+                last_text = text;
             }
             sleep(pause).await;
             pause = (pause * 2).min(BACK_OFF.1);

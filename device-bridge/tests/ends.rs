@@ -269,11 +269,11 @@ impl Stopped {
     /// Fills it, from a thread that waits in it from then on as everybody does who writes.
     fn stop(&self) {
         let mut writer = self.writer.try_clone().expect("a handle");
-        let (told, filling) = std::sync::mpsc::channel();
+        let (is_full, filling) = std::sync::mpsc::channel();
         let goes_on = Arc::clone(&self.goes_on);
         let filler = std::thread::Builder::new().spawn(move || {
             while !goes_on.load(Ordering::Relaxed) && writer.write_all(&[b'\n'; 512]).is_ok() {
-                let _ = told.send(());
+                let _ = is_full.send(());
             }
         });
         assert!(filler.is_ok());

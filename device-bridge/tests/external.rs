@@ -350,8 +350,8 @@ fn a_sender_that_pumps_energy_gives_no_more_than_the_reserve_and_nothing_where_n
     let mut far = Far::new(Hand::default(), Passivity::Observe);
     let value = far.value(0, 1.0);
     let now = Duration::from_millis(far.time);
-    let told: Vec<bool> = (0..3)
+    let accepted: Vec<bool> = (0..3)
         .map(|_| far.bridge.take_passed(&value, now, None))
         .collect();
-    assert_eq!(told, [true, false, false]);
+    assert_eq!(accepted, [true, false, false]);
 }

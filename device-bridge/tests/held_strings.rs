@@ -181,20 +181,20 @@ fn seen(name: &str, hand: Hand, moving: f64, losses: StringLosses, fate: Fate) -
         ..SafetySettings::default()
     };
     let mut port = DevicePort::new(Box::new(device), settings, reference_point(), &start);
-    let (mut told, mut fastest, mut same) = (false, 0.0_f64, 0);
+    let (mut frozen, mut fastest, mut same) = (false, 0.0_f64, 0);
     let mut last = start;
     for tick in 1..(rest * 1e3) as u64 {
         let report = port.tick(ms(tick), |_| {
             Some(Command::fresh(ms(tick), Vector6::zeros()))
         });
         let mut kinds = report.events.iter().map(|event| event.kind);
-        told |= kinds.any(|kind| kind == EventKind::DeviceFrozen);
+        frozen |= kinds.any(|kind| kind == EventKind::DeviceFrozen);
         let sample = report.reading.sample;
         fastest = fastest.max(sample.velocity.fixed_rows::<3>(0).norm());
         same += u64::from(sample.pose == last);
         last = sample.pose;
     }
-    (told, fastest, same)
+    (frozen, fastest, same)
 }
 
 #[test]

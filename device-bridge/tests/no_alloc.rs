@@ -27,7 +27,7 @@ fn drive(device: impl Device + 'static, before_tick: &mut dyn FnMut(u64)) {
     };
     let start = Pose::identity();
     let mut port = DevicePort::new(Box::new(device), settings, Point3::origin(), &start);
-    let (mut good, mut felt, mut told) = (0, 0, 0);
+    let (mut good, mut felt, mut events) = (0, 0, 0);
     assert_no_alloc(|| {
         for tick in 0..2000 {
             let now = Duration::from_millis(tick);
@@ -42,12 +42,12 @@ fn drive(device: impl Device + 'static, before_tick: &mut dyn FnMut(u64)) {
             });
             good += u32::from(report.reading.fault.is_none());
             felt += u32::from(report.wrench != Vector6::zeros());
-            told += report.events.iter().count();
+            events += report.events.iter().count();
         }
     });
     assert!(
-        good > 1000 && felt > 500 && told > 2,
-        "{good}, {felt}, {told}"
+        good > 1000 && felt > 500 && events > 2,
+        "{good}, {felt}, {events}"
     );
 }
 
@@ -72,9 +72,9 @@ fn a_recorded_device_does_not_allocate() {
 }
 
 /// What the thread of the Inverse service's client hands over.
-struct Told(triple_buffer::Output<ArmState>, [f64; 3]);
+struct Recorded(triple_buffer::Output<ArmState>, [f64; 3]);
 
-impl ArmPort for Told {
+impl ArmPort for Recorded {
     fn newest(&mut self) -> ArmState {
         *self.0.read()
     }
@@ -88,8 +88,8 @@ impl ArmPort for Told {
 fn a_haply_arm_does_not_allocate() {
     let (mut states, newest) = triple_buffer::TripleBuffer::new(&ArmState::default()).split();
     let placement = Placement::plain(Pose::identity(), Point3::origin());
-    let told = Box::new(Told(newest, [0.0; 3]));
-    let device = ArmDevice::new(told, HaplySettings::default().arm(), placement);
+    let arm = Box::new(Recorded(newest, [0.0; 3]));
+    let device = ArmDevice::new(arm, HaplySettings::default().arm(), placement);
     drive(device, &mut |tick| {
         let height = 1e-3 * (tick as f64 * 0.01).sin();
         states.write(ArmState {

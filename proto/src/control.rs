@@ -21,7 +21,7 @@
 pub use crate::role::Role;
 
 use crate::{
-    ClientStats, CouplingOffer, DecodeError, EncodeError, EventsTold, Group, MeshHash,
+    ClientStats, CouplingOffer, DecodeError, EncodeError, EventBatch, Group, MeshHash,
     PROTOCOL_VERSION, SceneDescription, Untrusted, VersionRange,
     codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_ranged, wire_tag},
     proof::Grant,
@@ -203,7 +203,7 @@ pub enum ControlMessage {
     Bye(Bye),
     Arm(ArmRequest),
     Group(Group),
-    Events(EventsTold),
+    Events(EventBatch),
     StatesBy(StatesBy),
 }
 
@@ -321,7 +321,7 @@ wire_messages! {
     Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
     MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
     Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10, Group(Group) = 14,
-    Events(EventsTold) = 15, StatesBy(StatesBy) = 16,
+    Events(EventBatch) = 15, StatesBy(StatesBy) = 16,
 }
 
 wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });

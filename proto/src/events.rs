@@ -21,11 +21,11 @@ pub const MAX_KEPT: usize = 1024;
 /// Events kept at a client for who takes them; beyond it the oldest go, and are counted.
 pub const MAX_QUEUED: usize = 1024;
 /// Most events in one message.
-pub const MAX_TOLD: usize = 256;
+pub const MAX_BATCH: usize = 256;
 
 /// All events after a number, on the control stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct EventsTold {
+pub struct EventBatch {
     /// Number of the event before the first of these. The first message of a stream tells no event, only where the client comes in.
     pub after: u32,
     /// The events, in order.
@@ -105,9 +105,9 @@ impl EventOutbox {
         self.trail.iter().map(|(record, _)| *record)
     }
 
-    /// What the stream tells a client that was told all up to `after`: at most [`MAX_TOLD`] events. If some of what it lacks is not kept any more, the
+    /// What the stream tells a client that was told all up to `after`: at most [`MAX_BATCH`] events. If some of what it lacks is not kept any more, the
     /// message begins after that.
-    pub fn told_after(&self, after: u32) -> EventsTold {
+    pub fn batch_after(&self, after: u32) -> EventBatch {
         // From the newest backwards: numbers that wrapped are told apart near their place only.
         let fresh = self
             .kept
@@ -128,9 +128,9 @@ impl EventOutbox {
             }
             _ => after,
         };
-        EventsTold {
+        EventBatch {
             after,
-            records: self.kept.range(start..).take(MAX_TOLD).copied().collect(),
+            records: self.kept.range(start..).take(MAX_BATCH).copied().collect(),
         }
     }
 }
@@ -170,16 +170,16 @@ impl EventInbox {
     }
 
     /// Takes what the stream tells.
-    pub fn told(&mut self, told: &EventsTold) {
+    pub fn receive(&mut self, batch: &EventBatch) {
         match self.newest {
-            None => self.newest = Some(told.after),
-            Some(newest) if is_newer(told.after, newest) => {
-                self.missed += u64::from(told.after.wrapping_sub(newest));
-                self.newest = Some(told.after);
+            None => self.newest = Some(batch.after),
+            Some(newest) if is_newer(batch.after, newest) => {
+                self.missed += u64::from(batch.after.wrapping_sub(newest));
+                self.newest = Some(batch.after);
             }
             Some(_) => {}
         }
-        for record in &told.records {
+        for record in &batch.records {
             if self
                 .newest
                 .is_some_and(|newest| is_newer(record.id, newest))
@@ -219,7 +219,7 @@ impl EventInbox {
     }
 }
 
-wire_ranged!(EventsTold {
+wire_ranged!(EventBatch {
     after in WRAPS,
     records
 });

@@ -68,7 +68,7 @@ pub use control::{ControlMessage, Refusal, Transport};
 pub use coupling::{CouplingOffer, EdgeCoupling};
 pub use credential::{Credential, Holder, JoinKey};
 pub use datagram::Payload;
-pub use events::{EventInbox, EventOutbox, EventsTold};
+pub use events::{EventBatch, EventInbox, EventOutbox};
 pub use force::{ForceSample, PassedForce};
 pub use group::{Group, GroupMember, GroupOpener, GroupSealer};
 pub use head::HeadSample;

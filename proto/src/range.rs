@@ -251,7 +251,7 @@ pub fn numbers() -> impl Iterator<Item = &'static Number> {
         state::EventRecord::NUMBERS,
         confirmation::Confirmation::NUMBERS,
         confirmation::SentState::NUMBERS,
-        events::EventsTold::NUMBERS,
+        events::EventBatch::NUMBERS,
         events::EventAck::NUMBERS,
         time::TimeRequest::NUMBERS,
         time::TimeResponse::NUMBERS,

@@ -24,6 +24,7 @@ mod roles;
 mod roll;
 mod samples;
 mod seal;
+mod terms;
 mod versions;
 
 /// Counts by thread: a test that forbids allocation forbids its own.

@@ -3,10 +3,9 @@
 use crate::barrier_support::*;
 use proptest::prelude::*;
 use taut_proto::barrier::{
-    ARRIVE_PERIOD_NS, Answer, Arrive, Drawn, FARTHEST_AHEAD, HUSH_NS, LEAD_NS, MAX_MEMBERS,
-    MAX_MISSES, MOST_REIGNS_AHEAD, Master, MasterSettings, Newest, Node, NodeState,
-    PROBATION_FRAMES, RECLAIM_NS, ReleaseHead, SILENCE_NS, SLOWEST_ARRIVE_NS, SUCCESSION_NS,
-    SWAP_TOLD_NS, Succession, Successor, Swap, TERMS_LEFT_OUT, Turn, WARM_UP_FRAMES,
+    ARRIVE_PERIOD_NS, Answer, Arrive, Drawn, HUSH_NS, LEAD_NS, MAX_MEMBERS, MAX_MISSES, Master,
+    MasterSettings, Newest, Node, NodeState, PROBATION_FRAMES, ReleaseHead, SILENCE_NS,
+    SLOWEST_ARRIVE_NS, SWAP_TOLD_NS, Swap, Turn, WARM_UP_FRAMES,
 };
 
 pub const MS: u64 = 1_000_000;
@@ -313,16 +312,21 @@ fn nodes_that_are_all_too_slow_are_shown_together_still() {
 fn swaps_are_compared_when_all_have_told() {
     let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
     let shown = released(&master);
-    let told = |ns| Arrive {
+    let swapped_at = |ns| Arrive {
         swapped_frame: shown,
         swapped_ns: ns,
         ..arrived(shown + 1)
     };
     assert_eq!(
-        master.arrive(last + 5 * MS, 1, &told(last + 70_000)).1,
+        master
+            .arrive(last + 5 * MS, 1, &swapped_at(last + 70_000))
+            .1,
         None
     );
-    let Some(skew) = master.arrive(last + 5 * MS, 2, &told(last + 90_000)).1 else {
+    let Some(skew) = master
+        .arrive(last + 5 * MS, 2, &swapped_at(last + 90_000))
+        .1
+    else {
         panic!("both have told");
     };
     assert_eq!(
@@ -417,157 +421,21 @@ fn a_node_that_hears_nothing_draws_on_its_own_again() {
     assert_eq!(node.turn(now), Turn::Draw { frame: 10 });
 }
 
-/// An ARRIVE of the reign of a node.
-fn of_reign(term: u64, frame: u64) -> Arrive {
-    Arrive {
-        term,
-        frame,
-        ..Arrive::default()
-    }
-}
-
-#[test]
-fn the_server_takes_the_frames_back_from_a_node_that_led_meanwhile() {
-    let (mut master, now) = in_step(Swap::Immediate, &[1, 2]);
-    let before = master.newest().expect("released").clone();
-    for session in [1, 2] {
-        let _ = master.arrive(now + MS, session, &arrived(before.frame + 1));
-    }
-    let _ = master.arrive(now + MS, 3, &of_reign(4, before.frame + 3000));
-    assert_eq!(
-        released(&master),
-        before.frame,
-        "nothing is released by an appeal"
-    );
-    let _ = release_when_due(&mut master);
-    let after = master.newest().expect("released").clone();
-    assert_eq!((after.term, after.master), (4 + TERMS_LEFT_OUT, 0));
-    assert!(after.rank() > before.rank());
-    assert!(after.frame > before.frame + 3000, "frames ascend");
-    // Whoever was in step with the server is still.
-    assert_eq!(after.waited, before.waited);
-    assert_eq!(master.counts().reclaimed, 1);
-}
-
-#[test]
-fn a_node_that_claims_reign_after_reign_moves_the_server_once_a_second_and_never_to_the_end_of_numbers()
- {
-    let (mut master, now) = in_step(Swap::Immediate, &[1, 2]);
-    let mut claim = |now, term, ahead| {
-        let frame = released(&master).saturating_add(ahead);
-        let (answer, _) = master.arrive(now, 1, &of_reign(term, frame));
-        let _ = release_when_due(&mut master);
-        let newest = master.newest().expect("released");
-        (answer, newest.term, newest.frame)
-    };
-    let (_, term, first) = claim(now, 7, FARTHEST_AHEAD);
-    assert_eq!(term, 7 + TERMS_LEFT_OUT);
-    let (_, term, next) = claim(now + RECLAIM_NS - 1, 1000, 0);
-    assert_eq!((term, next), (7 + TERMS_LEFT_OUT, first + 1), "too soon");
-    // What no reign can be is refused, and changes nothing: neither the term nor the frame.
-    let known = term;
-    for (term, ahead) in [
-        (known + MOST_REIGNS_AHEAD + 1, 0),
-        (u64::from(u32::MAX), 0),
-        (u64::MAX, 0),
-        (known + 1, FARTHEST_AHEAD + 1),
-        (known + 1, u64::MAX),
-    ] {
-        let (answer, after, _) = claim(now + 2 * RECLAIM_NS, term, ahead);
-        assert_eq!((answer, after), (Answer::Refused, known));
-    }
-    let (_, term, _) = claim(now + 2 * RECLAIM_NS, known + MOST_REIGNS_AHEAD, 0);
-    assert_eq!(term, known + MOST_REIGNS_AHEAD + TERMS_LEFT_OUT);
-    assert_eq!(master.counts().reclaimed, 2);
-}
-
-#[test]
-fn after_every_claim_that_counts_a_node_can_lead_still() {
-    let (mut master, mut now) = in_step(Swap::Immediate, &[1, 2]);
-    for _ in 0..100 {
-        now += RECLAIM_NS;
-        let term = released_term(&master) + MOST_REIGNS_AHEAD;
-        let _ = master.arrive(now, 1, &of_reign(term, released(&master)));
-        let _ = release_when_due(&mut master);
-    }
-    let of_server = master.newest().expect("released").clone();
-    let mut heir = Succession::new(1, now);
-    heir.release(now, &of_server);
-    let Successor::Stand { term, first } = heir.poll(now + SUCCESSION_NS) else {
-        panic!("it is its turn");
-    };
-    let own = ReleaseHead {
-        term,
-        master: 1,
-        frame: first,
-        ..of_server.clone()
-    };
-    assert!(own.rank() > of_server.rank(), "its frames are followed");
-    let mut other = Succession::new(2, now);
-    other.release(now, &of_server);
-    assert!(other.may_follow(now + SUCCESSION_NS, 1, &own));
-}
-
-fn released_term(master: &Master) -> u64 {
-    master.newest().map_or(0, |newest| newest.term)
-}
-
 #[test]
 fn a_swap_that_cannot_have_been_is_not_measured() {
     let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
     let shown = released(&master);
-    let told = |ns| Arrive {
+    let swapped_at = |ns| Arrive {
         swapped_frame: shown,
         swapped_ns: ns,
         ..arrived(shown + 1)
     };
     let now = last + 5 * MS;
-    assert_eq!(master.arrive(now, 1, &told(last)).1, None);
+    assert_eq!(master.arrive(now, 1, &swapped_at(last)).1, None);
     let impossible = now + SWAP_TOLD_NS + 1;
-    assert_eq!(master.arrive(now, 2, &told(impossible)).1, None);
+    assert_eq!(master.arrive(now, 2, &swapped_at(impossible)).1, None);
     release_when_due(&mut master);
     assert_eq!(master.newest().map(|newest| newest.skew_ns), Some(0));
-}
-
-#[test]
-fn a_member_is_followed_only_while_the_server_is_silent() {
-    let of_server = ReleaseHead {
-        term: 1,
-        frame: 70,
-        members: [2, 3].into_iter().collect(),
-        ..ReleaseHead::default()
-    };
-    let of_member = |term, frame| ReleaseHead {
-        term,
-        master: 2,
-        frame,
-        ..of_server.clone()
-    };
-    let mut heir = Succession::new(3, 0);
-    assert!(
-        !heir.may_follow(1000 * MS, 2, &of_member(2, 1094)),
-        "no part"
-    );
-    heir.release(0, &of_server);
-    for now in (0..1000).step_by(20) {
-        heir.hear(now * MS);
-        assert!(!heir.may_follow(now * MS, 2, &of_member(2, 1094)));
-    }
-    let silent = 980 * MS + SUCCESSION_NS;
-    assert!(heir.may_follow(silent, 2, &of_member(2, 1094)));
-    // Only for itself, and not so far ahead that nobody could follow it any more.
-    assert!(!heir.may_follow(silent, 3, &of_member(2, 1094)));
-    assert!(!heir.may_follow(silent, 0, &of_server));
-    assert!(!heir.may_follow(silent, 2, &of_member(u64::from(u32::MAX), 1094)));
-    let slower = ReleaseHead {
-        period_us: of_server.period_us + 1,
-        ..of_member(2, 1094)
-    };
-    assert!(
-        !heir.may_follow(silent, 2, &slower),
-        "frames grow no slower"
-    );
-    assert!(!heir.may_follow(silent, 2, &of_member(2, u64::MAX)));
 }
 
 #[test]

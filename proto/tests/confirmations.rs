@@ -16,16 +16,16 @@ fn genuine(tick: u64) -> SentState {
 
 /// The newest states up to `newest`, as the server tells them when it was asked at `asked_ns`.
 fn confirmation(asked_ns: u64, newest: u64) -> Confirmation {
-    let mut told = Confirmation {
+    let mut confirmation = Confirmation {
         asked_ns,
         ..Confirmation::default()
     };
     for tick in (1..=newest).rev() {
-        if !told.add(genuine(tick)) {
+        if !confirmation.add(genuine(tick)) {
             break;
         }
     }
-    told
+    confirmation
 }
 
 /// A client that took ticks 1 to `newest`, one a millisecond.
@@ -52,8 +52,8 @@ fn genuine_states_are_confirmed_whatever_is_lost() {
         }
         // Every second confirmation is lost: each state is in two.
         if exchange % 2 == 0 {
-            let told = confirmation(now * MS, now);
-            assert_eq!(waiting.confirm(&told), Trust::Kept);
+            let confirmation = confirmation(now * MS, now);
+            assert_eq!(waiting.confirm(&confirmation), Trust::Kept);
         }
     }
 }
@@ -69,8 +69,8 @@ fn a_state_that_the_server_did_not_send_is_found_by_the_first_confirmation_that_
         if tick > 50 {
             assert_eq!(waiting.confirm(&confirmation(50 * MS, 50)), Trust::Kept);
         }
-        let told = confirmation(52 * MS, 60);
-        assert_eq!(waiting.confirm(&told), Trust::Forged { tick });
+        let confirmation = confirmation(52 * MS, 60);
+        assert_eq!(waiting.confirm(&confirmation), Trust::Forged { tick });
         assert_eq!(waiting.newest(), Some(60));
     }
 }
@@ -93,10 +93,10 @@ fn what_nobody_confirms_is_not_believed_for_long() {
     assert_eq!(trust, Trust::Unconfirmed);
     // Older than all that the server tells of: nobody knows any more.
     let mut waiting = client(1);
-    let told = confirmation(300 * MS, 1 + MAX_CONFIRMED as u64);
-    assert_eq!(waiting.confirm(&told), Trust::Unconfirmed);
+    let confirmation = confirmation(300 * MS, 1 + MAX_CONFIRMED as u64);
+    assert_eq!(waiting.confirm(&confirmation), Trust::Unconfirmed);
     waiting.clear();
-    assert_eq!(waiting.confirm(&told), Trust::Kept);
+    assert_eq!(waiting.confirm(&confirmation), Trust::Kept);
 }
 
 #[test]

@@ -9,16 +9,16 @@ fn the_light_of_screens_is_compared_beside_their_calls() {
     let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
     let shown = released(&master);
     let now = last + 20 * MS;
-    let told = |call, light| Arrive {
+    let arrives = |call, light| Arrive {
         swapped_frame: shown,
         swapped_ns: last + call,
         lit_frame: shown,
         lit_ns: light,
         ..arrived(shown + 1)
     };
-    let _ = master.arrive(now, 1, &told(70_000, last + 9 * MS));
+    let _ = master.arrive(now, 1, &arrives(70_000, last + 9 * MS));
     assert_eq!(master.take_light(), None, "one has not told");
-    let _ = master.arrive(now, 2, &told(90_000, last + 12 * MS));
+    let _ = master.arrive(now, 2, &arrives(90_000, last + 12 * MS));
     let lit = master.take_light().expect("both have told");
     assert_eq!((lit.frame, lit.skew_ns), (shown, 3 * MS));
     release_when_due(&mut master);
@@ -29,14 +29,14 @@ fn the_light_of_screens_is_compared_beside_their_calls() {
     let shown = released(&master);
     let now = now + 50 * MS;
     for (session, call) in [(1, 10_000), (2, 30_000)] {
-        let told = Arrive {
+        let arrives = Arrive {
             swapped_frame: shown,
             swapped_ns: now + call,
             lit_frame: if session == 1 { shown } else { 0 },
             lit_ns: now + MS,
             ..arrived(shown + 1)
         };
-        let skew = master.arrive(now, session, &told).1;
+        let skew = master.arrive(now, session, &arrives).1;
         assert_eq!(
             skew.map(|skew| skew.skew_ns),
             (session == 2).then_some(20_000)
@@ -48,7 +48,7 @@ fn the_light_of_screens_is_compared_beside_their_calls() {
 #[test]
 fn light_that_nobody_takes_makes_room_for_newer() {
     let (mut master, _) = in_step(Swap::Immediate, &[1, 2]);
-    let mut told = Vec::new();
+    let mut frames = Vec::new();
     for _ in 0..20 {
         let shown = released(&master);
         let now = master.newest().map_or(0, |newest| newest.swap_ns) + MS;
@@ -61,13 +61,13 @@ fn light_that_nobody_takes_makes_room_for_newer() {
             };
             let _ = master.arrive(now, session, &lit);
         }
-        told.push(shown);
+        frames.push(shown);
         release_when_due(&mut master);
     }
     let kept: Vec<u64> = std::iter::from_fn(|| master.take_light())
         .map(|lit| lit.frame)
         .collect();
-    assert_eq!(kept, told[told.len() - 8..]);
+    assert_eq!(kept, frames[frames.len() - 8..]);
 }
 
 /// What a node may tell of light: frames about the released one or any, moments about now or any.
@@ -86,9 +86,9 @@ proptest! {
 
     /// Whatever nodes tell of their light: frames go on, and what is made of it is of members, each once, and as far apart as can be believed.
     #[test]
-    fn no_light_that_is_told_disturbs_frames(told in prop::collection::vec(any_light(), 1..60)) {
+    fn no_light_that_is_told_disturbs_frames(arrives in prop::collection::vec(any_light(), 1..60)) {
         let (mut master, mut last) = in_step(Swap::Immediate, &[1, 2, 3]);
-        for tellings in told.chunks(3) {
+        for tellings in arrives.chunks(3) {
             let shown = released(&master);
             let now = last + 5 * MS;
             for session in 1..=3 {

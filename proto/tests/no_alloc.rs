@@ -65,7 +65,7 @@ fn a_change_of_generation_takes_no_memory_where_datagrams_are_sealed_and_opened(
 fn events_take_no_memory_where_states_are_made_and_received() {
     let mut outbox = EventOutbox::default();
     let mut inbox = EventInbox::default();
-    inbox.told(&outbox.told_after(0));
+    inbox.receive(&outbox.batch_after(0));
     let mut taken = Vec::with_capacity(4096);
     assert_no_alloc(|| {
         for id in 1..3000 {

@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use std::collections::VecDeque;
 use taut_proto::{
-    EventInbox, EventOutbox, EventsTold,
-    events::{MAX_KEPT, MAX_QUEUED, MAX_TOLD, REPEAT_NS, is_newer},
+    EventBatch, EventInbox, EventOutbox,
+    events::{MAX_BATCH, MAX_KEPT, MAX_QUEUED, REPEAT_NS, is_newer},
     state::EventRecord,
 };
 
@@ -38,7 +38,7 @@ fn repeated(outbox: &mut EventOutbox, now_ns: u64, by_all: Option<u32>) -> Vec<u
 /// A client that came in after event `after`.
 fn inbox(after: u32) -> EventInbox {
     let mut inbox = EventInbox::default();
-    inbox.told(&EventsTold {
+    inbox.receive(&EventBatch {
         after,
         records: Vec::new(),
     });
@@ -57,7 +57,7 @@ fn states_repeat_an_event_until_all_have_it_or_its_time_is_over() {
     assert_eq!(repeated(&mut outbox, 10 * MS + REPEAT_NS, Some(1)), [0; 0]);
     assert!(!outbox.repeats());
     assert_eq!(
-        ids(&outbox.told_after(0).records),
+        ids(&outbox.batch_after(0).records),
         [1, 2],
         "the stream tells both"
     );
@@ -70,7 +70,7 @@ fn a_state_alone_delivers_only_the_next_event_and_the_stream_fills_gaps() {
     assert_eq!(drained(&mut inbox), [0; 0], "5 is missing");
     inbox.repeated(&[record(5), record(6)]);
     assert_eq!(drained(&mut inbox), [5, 6]);
-    inbox.told(&EventsTold {
+    inbox.receive(&EventBatch {
         after: 4,
         records: (5..=9).map(record).collect(),
     });
@@ -84,7 +84,7 @@ fn what_was_before_a_client_is_not_for_it() {
     let mut late = EventInbox::default();
     late.repeated(&[record(1), record(2)]);
     assert_eq!((drained(&mut late), late.newest()), (Vec::new(), None));
-    late.told(&EventsTold {
+    late.receive(&EventBatch {
         after: 2,
         records: Vec::new(),
     });
@@ -106,7 +106,7 @@ fn numbers_may_wrap_and_the_stream_may_leave_numbers_out() {
         assert!(outbox.push(record(start.wrapping_add(step)), 0));
     }
     assert!(outbox.push(record(40), 0));
-    inbox.told(&outbox.told_after(start.wrapping_sub(1)));
+    inbox.receive(&outbox.batch_after(start.wrapping_sub(1)));
     assert_eq!(
         drained(&mut inbox),
         [u32::MAX - 2, u32::MAX - 1, u32::MAX, 0, 1, 2, 40]
@@ -121,20 +121,20 @@ fn a_stream_that_stands_still_for_too_long_is_told_what_it_missed() {
     for id in 1..=MAX_KEPT as u32 {
         outbox.push(record(id), 0);
     }
-    assert_eq!(outbox.told_after(0).after, 0, "all are there yet");
+    assert_eq!(outbox.batch_after(0).after, 0, "all are there yet");
     for id in 1..=10 {
         outbox.push(record(MAX_KEPT as u32 + id), 0);
     }
     let mut after = 0;
     let mut delivered = Vec::new();
     loop {
-        let told = outbox.told_after(after);
-        let Some(last) = told.records.last() else {
+        let batch = outbox.batch_after(after);
+        let Some(last) = batch.records.last() else {
             break;
         };
-        assert!(told.records.len() <= MAX_TOLD);
+        assert!(batch.records.len() <= MAX_BATCH);
         after = last.id;
-        inbox.told(&told);
+        inbox.receive(&batch);
         delivered.extend(drained(&mut inbox));
     }
     assert_eq!(delivered, (11..=MAX_KEPT as u32 + 10).collect::<Vec<_>>());
@@ -195,8 +195,8 @@ proptest! {
         outbox.push(record(next), 0);
         let first = next.wrapping_add(1);
         let mut inbox = inbox(next);
-        let mut told = next;
-        let mut stream: VecDeque<(u64, EventsTold)> = VecDeque::new();
+        let mut sent_up_to = next;
+        let mut stream: VecDeque<(u64, EventBatch)> = VecDeque::new();
         let mut under_way: Vec<(u64, Vec<EventRecord>)> = Vec::new();
         let mut delivered = Vec::new();
         let (mut burst_left, mut acknowledged) = (0, None);
@@ -205,9 +205,9 @@ proptest! {
                 next = next.wrapping_add(1);
                 outbox.push(record(next), ms * MS);
             }
-            let news = outbox.told_after(told);
+            let news = outbox.batch_after(sent_up_to);
             if let Some(last) = news.records.last() {
-                told = last.id;
+                sent_up_to = last.id;
                 stream.push_back((ms + stream_delay_ms, news));
             }
             if let Some(fate) = fates.get(ms as usize) {
@@ -231,7 +231,7 @@ proptest! {
                 *arrival > ms
             });
             while let Some((arrival, news)) = stream.front() && *arrival <= ms {
-                inbox.told(news);
+                inbox.receive(news);
                 stream.pop_front();
             }
             delivered.extend(drained(&mut inbox));

@@ -50,29 +50,29 @@ fn a_whole_generation_is_sealed_and_opened_and_the_next_one_goes_on() {
 fn a_key_is_left_after_an_hour_and_what_was_left_out_is_not_missing() {
     let (sealer, mut opener) = pair();
     let start = 5 * ROLL_NS; // any clock
-    let mut told = |sealer: &Sealer| {
+    let mut counts = |sealer: &Sealer| {
         let datagram = seal(sealer, 1);
         let opened = opener.open(&datagram);
         let opened = opened.unwrap_or_else(|error| panic!("{error}"));
         (opened.header.sequence, opened.expected)
     };
     sealer.roll_by_time(start);
-    assert_eq!(told(&sealer), (0, 0));
+    assert_eq!(counts(&sealer), (0, 0));
     sealer.roll_by_time(start + ROLL_NS - 1);
-    assert_eq!(told(&sealer), (1, 1));
+    assert_eq!(counts(&sealer), (1, 1));
     sealer.roll_by_time(start + ROLL_NS);
     sealer.roll_by_time(start + ROLL_NS + 1);
-    assert_eq!(told(&sealer), (ROLL_PACKETS, ROLL_PACKETS));
-    assert_eq!(told(&sealer), (ROLL_PACKETS + 1, ROLL_PACKETS + 1));
+    assert_eq!(counts(&sealer), (ROLL_PACKETS, ROLL_PACKETS));
+    assert_eq!(counts(&sealer), (ROLL_PACKETS + 1, ROLL_PACKETS + 1));
     // The first of a key may be lost like any other.
     sealer.roll_by_time(start + 2 * ROLL_NS);
     let _ = seal(&sealer, 2);
-    assert_eq!(told(&sealer), (2 * ROLL_PACKETS + 1, 2 * ROLL_PACKETS));
+    assert_eq!(counts(&sealer), (2 * ROLL_PACKETS + 1, 2 * ROLL_PACKETS));
     // Where a key is used up nothing is left out, and what is lost is missing.
     sealer.skip_to(3 * ROLL_PACKETS - 1);
-    let _ = told(&sealer);
+    let _ = counts(&sealer);
     let _ = seal(&sealer, 3);
-    assert_eq!(told(&sealer), (3 * ROLL_PACKETS + 1, 3 * ROLL_PACKETS));
+    assert_eq!(counts(&sealer), (3 * ROLL_PACKETS + 1, 3 * ROLL_PACKETS));
 }
 
 #[test]

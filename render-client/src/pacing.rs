@@ -24,7 +24,7 @@ pub(crate) struct Pacer {
     drawn: Option<(u64, FrameStatus)>,
     heads: FrameHeads,
     /// As last written to the log.
-    told: FrameStatus,
+    reported: FrameStatus,
 }
 
 impl Pacer {
@@ -39,7 +39,7 @@ impl Pacer {
                 heads: HeadPredictor::default(),
                 display_ns,
             },
-            told: FrameStatus::default(),
+            reported: FrameStatus::default(),
         }
     }
 
@@ -107,7 +107,7 @@ impl Pacer {
     /// Writes to the log when that changes.
     fn log(&mut self) {
         let status = self.status();
-        let differs = |of: fn(&FrameStatus) -> (bool, u32)| of(&status) != of(&self.told);
+        let differs = |of: fn(&FrameStatus) -> (bool, u32)| of(&status) != of(&self.reported);
         if !differs(|status| (status.synchronised, status.members)) {
             return;
         }
@@ -116,7 +116,7 @@ impl Pacer {
         } else {
             tracing::info!("frames are shown by this node alone");
         }
-        self.told = status;
+        self.reported = status;
     }
 }
 

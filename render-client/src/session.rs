@@ -39,7 +39,7 @@ pub(crate) struct Session {
     /// When the node began to join.
     began: Instant,
     /// Sessions of which the first frame was told.
-    told: u64,
+    reported: u64,
     stop: Arc<AtomicBool>,
 }
 
@@ -126,7 +126,7 @@ impl Session {
             withdrawn: 0,
             earlier: (0, 0),
             began,
-            told: 0,
+            reported: 0,
             stop,
         };
         Ok(Some((session, stage, show)))
@@ -153,7 +153,7 @@ impl Session {
     /// `drawn` gives the pictures and the adapter, for people.
     pub(crate) fn tell_first_frame(&mut self, drawn: impl FnOnce() -> (String, String)) {
         let sessions = self.sessions();
-        if std::mem::replace(&mut self.told, sessions) == sessions {
+        if std::mem::replace(&mut self.reported, sessions) == sessions {
             return;
         }
         let clock = self.link.session_now().map_or_else(

@@ -150,10 +150,11 @@ fn a_recording_that_was_changed_is_found_out() {
     match again(&path) {
         Ok(report) => {
             assert_eq!(report.different_updates, 1);
-            let told = report.first_difference.unwrap_or_default();
+            let difference = report.first_difference.unwrap_or_default();
             assert!(
-                told.contains(&format!("update {last}:")) && told.contains("gap 1.25e-1"),
-                "{told}"
+                difference.contains(&format!("update {last}:"))
+                    && difference.contains("gap 1.25e-1"),
+                "{difference}"
             );
         }
         Err(error) => panic!("{error}"),

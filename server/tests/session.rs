@@ -189,16 +189,16 @@ fn who_asks_for_force_is_told_when_the_session_ends_before_it_answers() {
     let key_file = directory.path().join("cluster.key");
     assert!(create_key_file(&key_file).is_ok());
     // On a busy machine the request may have been given up before the session was ended: then once more.
-    let told = (0..10).any(|_| {
+    let answered = (0..10).any(|_| {
         let answer = answer_of_a_session_that_ends(&key_file);
         let gave_up = ["no device sample came", "no server answers"]
             .iter()
             .any(|words| answer.contains(words));
-        let told = answer.contains("ended before it answered");
-        assert!(told || gave_up, "{answer}");
-        told
+        let answered = answer.contains("ended before it answered");
+        assert!(answered || gave_up, "{answer}");
+        answered
     });
-    assert!(told, "it was never told");
+    assert!(answered, "it was never told");
 }
 
 /// What an operator's client receives of a session until it has seen `enough`.

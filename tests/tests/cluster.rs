@@ -188,9 +188,9 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
     let description = late.link.description();
     assert_eq!(description, early.link.description());
     assert_eq!(description.name, SCENE);
-    let told = std::iter::once(&description.god_object).chain(&description.obstacles);
+    let bodies = std::iter::once(&description.god_object).chain(&description.obstacles);
     assert_eq!(description.obstacles.len() + 1, scene.bodies.len());
-    for (body, built) in told.zip(&scene.bodies) {
+    for (body, built) in bodies.zip(&scene.bodies) {
         let mesh = runtime
             .block_on(late.link.mesh(body.mesh))
             .unwrap_or_else(|error| panic!("{error}"));

@@ -151,24 +151,24 @@ fn nodes_go_on_swapping_together_when_the_server_and_then_their_leader_are_kille
     let options = ClientOptions::new(server.quic.clone(), key, Role::Render, "witness");
     let witness = Witness::start(&runtime, options);
     witness.show("frames of the server", 0, 3);
-    let reign = witness.status().frame + FRAMES_LEFT_OUT / 2;
+    let led_from = witness.status().frame + FRAMES_LEFT_OUT / 2;
 
     server.process.kill();
     wait_for_words(&mut front, LEADS);
     // All three stay members only as long as they draw and arrive.
-    witness.show("frames without the server", reign, 3);
+    witness.show("frames without the server", led_from, 3);
     assert!(!table.stderr().contains(LEADS), "one leads");
 
-    let reign = witness.status().frame + FRAMES_LEFT_OUT / 2;
+    let led_from = witness.status().frame + FRAMES_LEFT_OUT / 2;
     front.kill();
     wait_for_words(&mut table, LEADS);
-    witness.show("frames without the first leader", reign, 2);
+    witness.show("frames without the first leader", led_from, 2);
 
     let at = ["--quic", server.quic.as_str(), "--udp", server.udp.as_str()];
     let again = workbench.serve_as("server-again", &at);
     wait_for("the witness in the next session", LIMIT, || {
         let status = witness.status();
-        (status.synchronised && status.frame < reign).then_some(())
+        (status.synchronised && status.frame < led_from).then_some(())
     });
     witness.show("frames of the next server", 0, 2);
     drop(witness);

@@ -20,7 +20,7 @@ fn scene(color: &str, friction: f64) -> String {
     )
 }
 
-fn told(server: &mut Server, words: &str, count: usize) {
+fn wait_for_lines(server: &mut Server, words: &str, count: usize) {
     wait_for(&format!("\"{words}\" ({count} times)"), LIMIT, || {
         assert!(server.process.is_running(), "the server ended");
         let log = server.process.stderr();
@@ -66,7 +66,7 @@ fn nodes_follow_a_scene_that_is_edited_and_one_that_is_wrong_changes_nothing() {
         &out,
     ];
     let node = workbench.join("render", "front", &server, &small);
-    told(&mut server, "front joined", 1);
+    wait_for_lines(&mut server, "front joined", 1);
     wait_for("a picture", LIMIT, || (pictures(&drawn) > 0).then_some(()));
 
     // A fault of the file, and one that only shows when a session is to begin: the ball starts within the block.
@@ -74,18 +74,18 @@ fn nodes_follow_a_scene_that_is_edited_and_one_that_is_wrong_changes_nothing() {
         "edited.toml",
         "name = \"edited\"\n[god_object]\nmass = -1\n",
     );
-    told(&mut server, "the changed scene is not taken", 1);
+    wait_for_lines(&mut server, "the changed scene is not taken", 1);
     let within = scene("#c03030", 0.2).replace("0.0, 0.0, 0.05", "0.0, 0.0, 0.03");
     workbench.write("edited.toml", within);
-    told(&mut server, "the changed scene is not taken", 2);
+    wait_for_lines(&mut server, "the changed scene is not taken", 2);
     let before = pictures(&drawn);
     wait_for("it goes on", LIMIT, || {
         (pictures(&drawn) > before + 2).then_some(())
     });
 
     workbench.write("edited.toml", scene("#30c030", 0.5));
-    told(&mut server, "is taken: the force fades", 1);
-    told(&mut server, "front joined", 2);
+    wait_for_lines(&mut server, "is taken: the force fades", 1);
+    wait_for_lines(&mut server, "front joined", 2);
     let before = pictures(&drawn);
     wait_for("pictures of the new scene", LIMIT, || {
         (pictures(&drawn) > before + 2).then_some(())
@@ -93,8 +93,8 @@ fn nodes_follow_a_scene_that_is_edited_and_one_that_is_wrong_changes_nothing() {
     // Another scene by its name in the workbench file.
     workbench.set("scene", "peg-in-a-hole");
     workbench.save();
-    told(&mut server, "is taken: the force fades", 2);
-    told(&mut server, "front joined", 3);
+    wait_for_lines(&mut server, "is taken: the force fades", 2);
+    wait_for_lines(&mut server, "front joined", 3);
     let report = leave(node);
     assert!(report.contains("sessions: 3"), "{report}");
     let report = server.stop();

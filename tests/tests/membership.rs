@@ -71,7 +71,7 @@ fn node(workbench: &TestWorkbench, name: &str, server: &Server, more: &[&str]) -
 }
 
 /// Waits until the log of a server has a line with both parts for the `count`-th time; the last of them.
-fn told(server: &mut Server, parts: [&str; 2], count: usize) -> String {
+fn wait_for_lines(server: &mut Server, parts: [&str; 2], count: usize) -> String {
     let what = format!("\"{} .. {}\" ({count} times)", parts[0], parts[1]);
     wait_for(&what, JOIN_LIMIT, || {
         assert!(server.process.is_running(), "the server ended");
@@ -109,13 +109,13 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
     let mut server = workbench.serve(&[]);
     let steady = node(&workbench, "table", &server, &[]);
     let mut victim = node(&workbench, "front", &server, &[]);
-    told(&mut server, ["table joined", ""], 1);
-    told(&mut server, ["front joined", ""], 1);
+    wait_for_lines(&mut server, ["table joined", ""], 1);
+    wait_for_lines(&mut server, ["front joined", ""], 1);
     std::thread::sleep(Duration::from_secs(1));
 
     let killed = Instant::now();
     victim.kill();
-    let line = told(&mut server, ["front", "left: it was silent"], 1);
+    let line = wait_for_lines(&mut server, ["front", "left: it was silent"], 1);
     println!(
         "killed: evicted after {} ms of silence, told {:?} after the kill",
         number_before(&line, " ms"),
@@ -128,11 +128,11 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
 
     // Its name is free: the same node again.
     let victim = node(&workbench, "front", &server, &[]);
-    told(&mut server, ["front joined", ""], 2);
+    wait_for_lines(&mut server, ["front joined", ""], 2);
     std::thread::sleep(Duration::from_secs(1));
     victim.pause();
     let paused = Instant::now();
-    let line = told(&mut server, ["front", "left: it was silent"], 2);
+    let line = wait_for_lines(&mut server, ["front", "left: it was silent"], 2);
     println!(
         "stopped: evicted after {} ms of silence, told {:?} after the stop",
         number_before(&line, " ms"),
@@ -141,7 +141,7 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
     std::thread::sleep(Duration::from_millis(300));
     victim.resume();
     let resumed = Instant::now();
-    told(&mut server, ["front joined", ""], 3);
+    wait_for_lines(&mut server, ["front joined", ""], 3);
     println!(
         "joined again, told {:?} after it went on",
         resumed.elapsed()
@@ -206,13 +206,13 @@ fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_n
     std::thread::sleep(Duration::from_secs(2));
     let mut again = serve_again(&workbench, "server-again", &server);
     let serving = Instant::now();
-    told(&mut again, ["bridge joined", ""], 1);
+    wait_for_lines(&mut again, ["bridge joined", ""], 1);
     println!(
         "the bridge joined, told {:?} after the start",
         serving.elapsed()
     );
     if drawing {
-        told(&mut again, ["front joined", ""], 1);
+        wait_for_lines(&mut again, ["front joined", ""], 1);
         println!(
             "the node joined, told {:?} after the start",
             serving.elapsed()
@@ -270,24 +270,24 @@ fn a_server_that_stops_ends_its_nodes_unless_they_are_to_stay() {
     let drawing = draws(&workbench);
     let (server, bridge) = workbench.serve_with_bridge(SCENE, &["--stay"]);
     let mut server = server;
-    told(&mut server, ["bridge joined", ""], 1);
+    wait_for_lines(&mut server, ["bridge joined", ""], 1);
     let nodes = drawing.then(|| {
         let ends = node(&workbench, "front", &server, &[]);
         let stays = node(&workbench, "table", &server, &["--stay"]);
-        told(&mut server, ["front joined", ""], 1);
-        told(&mut server, ["table joined", ""], 1);
+        wait_for_lines(&mut server, ["front joined", ""], 1);
+        wait_for_lines(&mut server, ["table joined", ""], 1);
         (ends, stays)
     });
     let (quic, udp) = (server.quic.clone(), server.udp.clone());
     server.stop();
     let at = ["--quic", quic.as_str(), "--udp", udp.as_str()];
     let mut again = workbench.serve_as("server-again", &at);
-    told(&mut again, ["bridge joined", ""], 1);
+    wait_for_lines(&mut again, ["bridge joined", ""], 1);
     if let Some((ends, stays)) = nodes {
         let ended = ends.end(END_LIMIT);
         assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
         assert_eq!(number_after(&ended.stdout, "sessions: "), 1.0);
-        told(&mut again, ["table joined", ""], 1);
+        wait_for_lines(&mut again, ["table joined", ""], 1);
         let report = leave(stays);
         assert_eq!(number_after(&report, "sessions: "), 2.0, "{report}");
     }
@@ -335,7 +335,7 @@ fn a_node_that_starts_again_fetches_no_mesh_and_one_that_comes_to_another_scene_
     server.process.kill();
     workbench.set("scene", "peg-in-a-hole");
     let mut again = serve_again(&workbench, "server-again", &server);
-    told(&mut again, ["front joined", ""], 1);
+    wait_for_lines(&mut again, ["front joined", ""], 1);
     let before = drawn();
     wait_for("pictures of the other scene", JOIN_LIMIT, || {
         (drawn() > before + 2).then_some(())

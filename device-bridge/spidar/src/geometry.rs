@@ -100,15 +100,18 @@ impl Geometry {
     /// Half the smallest edge of the box that the motors span, m.
     #[must_use]
     pub fn half_width(&self) -> f64 {
-        (0..3)
-            .map(|axis| {
-                let along = self.motors.iter().map(|motor| motor[axis]);
-                let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-                    (a.min(x), b.max(x))
-                });
-                0.5 * (high - low)
-            })
+        let sides = (0..3).map(|axis| self.span(axis));
+        sides
+            .map(|(low, high)| 0.5 * (high - low))
             .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Least and largest coordinate of the motors along an axis, m.
+    fn span(&self, axis: usize) -> (f64, f64) {
+        let along = self.motors.iter().map(|motor| motor[axis]);
+        along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        })
     }
 
     /// How far a point (frame axes, m) lies beyond the box that the motors span, along the worst axis; not above zero inside.
@@ -116,10 +119,7 @@ impl Geometry {
     pub fn beyond_box(&self, point: &Point3<f64>) -> f64 {
         (0..3)
             .map(|axis| {
-                let along = self.motors.iter().map(|motor| motor[axis]);
-                let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-                    (a.min(x), b.max(x))
-                });
+                let (low, high) = self.span(axis);
                 (low - point[axis]).max(point[axis] - high)
             })
             .fold(f64::NEG_INFINITY, f64::max)

@@ -36,7 +36,7 @@ use crate::device_loop::Totals;
 use crate::placement::Placement;
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
-use crate::service_manager::Teller;
+use crate::service_manager::ServiceNotifier;
 use crate::signals::EndFlag;
 
 /// How often the watching thread looks.
@@ -54,11 +54,11 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     arm_switch::listen_at_console(&wishes);
     let (alive, asked) = (Alive::default(), end.clone());
     let turns = [alive.device.clone(), alive.watch.clone()];
-    let teller = Teller::start("the bridge runs", turns, move || asked.is_asked());
+    let notifier = ServiceNotifier::start("the bridge runs", turns, move || asked.is_asked());
     let outcome = run_loop(args, options, end.clone(), alive, wishes, |scene| {
         build_loop(args, &motion, scene)
     });
-    drop(teller);
+    drop(notifier);
     end.let_signals_kill();
     outcome
 }

@@ -348,13 +348,13 @@ mod tests {
     #[test]
     fn a_watcher_that_breaks_down_takes_the_device_loop_with_it() {
         let (end, ended) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
-        let (of_loop, told) = (Arc::clone(&end), Arc::clone(&ended));
+        let (of_loop, end_noted) = (Arc::clone(&end), Arc::clone(&ended));
         let broke = std::panic::catch_unwind(move || {
             let thread = thread::Builder::new().spawn(move || {
                 while !of_loop.load(Ordering::Relaxed) {
                     thread::sleep(Duration::from_millis(1));
                 }
-                told.store(true, Ordering::Relaxed);
+                end_noted.store(true, Ordering::Relaxed);
             });
             let _thread = LoopThread {
                 end,

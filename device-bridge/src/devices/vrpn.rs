@@ -200,15 +200,15 @@ mod tests {
     use taut_vrpn::PoseReport;
 
     #[derive(Clone, Default)]
-    struct Told(Arc<Mutex<TrackerState>>);
+    struct Tracker(Arc<Mutex<TrackerState>>);
 
-    impl TrackerReader for Told {
+    impl TrackerReader for Tracker {
         fn newest(&mut self) -> TrackerState {
             *self.0.lock().expect("not poisoned")
         }
     }
 
-    impl Told {
+    impl Tracker {
         fn tell(&self, position: [f64; 3], rotation: [f64; 4]) {
             let mut state = self.0.lock().expect("not poisoned");
             state.reports += 1;
@@ -223,8 +223,8 @@ mod tests {
 
     const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
-    fn device(anchor: Anchor) -> (Told, VrpnDevice) {
-        let told = Told::default();
+    fn device(anchor: Anchor) -> (Tracker, VrpnDevice) {
+        let tracker = Tracker::default();
         let settings = VrpnSettings {
             source: VrpnSource {
                 address: "Tracker0@here".parse().expect("valid"),
@@ -244,8 +244,8 @@ mod tests {
                 2.0,
             ),
         };
-        let device = VrpnDevice::new(Box::new(told.clone()), &settings, placement);
-        (told, device)
+        let device = VrpnDevice::new(Box::new(tracker.clone()), &settings, placement);
+        (tracker, device)
     }
 
     fn ms(time: u64) -> Duration {
@@ -254,13 +254,13 @@ mod tests {
 
     #[test]
     fn the_body_starts_where_it_is_and_follows_the_sensor_at_the_display_s_scale() {
-        let (told, mut device) = device(Anchor::Start);
+        let (tracker, mut device) = device(Anchor::Start);
         assert_eq!(device.read(ms(1)), Err(DeviceFault::NotStarted));
-        told.tell([5.0, 6.0, 7.0], UPRIGHT);
+        tracker.tell([5.0, 6.0, 7.0], UPRIGHT);
         let first = device.read(ms(2)).expect("a sample");
         let start = device.placement.start;
         assert!((first.pose.to_homogeneous() - start.to_homogeneous()).norm() < 1e-12);
-        told.tell([5.0, 6.0, 7.04], UPRIGHT);
+        tracker.tell([5.0, 6.0, 7.04], UPRIGHT);
         let _ = device.read(ms(12));
         let under_way = device.read(ms(15)).expect("a sample");
         assert!(under_way.velocity[2] > 0.0);
@@ -271,11 +271,11 @@ mod tests {
 
     #[test]
     fn a_turn_of_the_sensor_turns_about_the_reference_point() {
-        let (told, mut device) = device(Anchor::Start);
-        told.tell([0.0; 3], UPRIGHT);
+        let (tracker, mut device) = device(Anchor::Start);
+        tracker.tell([0.0; 3], UPRIGHT);
         let _ = device.read(ms(0));
         let half = 0.4_f64;
-        told.tell([0.0; 3], [0.0, 0.0, half.sin(), half.cos()]);
+        tracker.tell([0.0; 3], [0.0, 0.0, half.sin(), half.cos()]);
         let _ = device.read(ms(10));
         let there = device.read(ms(60)).expect("a sample").pose;
         let (start, g) = (device.placement.start, device.placement.reference_point);
@@ -286,39 +286,39 @@ mod tests {
 
     #[test]
     fn silence_is_a_loss_and_the_return_does_not_jump() {
-        let (told, mut device) = device(Anchor::Start);
-        told.tell([0.0; 3], UPRIGHT);
+        let (tracker, mut device) = device(Anchor::Start);
+        tracker.tell([0.0; 3], UPRIGHT);
         let before = device.read(ms(10)).expect("a sample").pose;
         assert!(device.read(ms(110)).is_ok());
         assert_eq!(
             device.read(ms(111)),
             Err(DeviceFault::Lost { age: ms(101) })
         );
-        told.tell([1.0, 1.0, 1.0], UPRIGHT);
+        tracker.tell([1.0, 1.0, 1.0], UPRIGHT);
         assert_eq!(device.read(ms(200)), Err(DeviceFault::Reconnected));
         let after = device.read(ms(201)).expect("back").pose;
         assert!((after.to_homogeneous() - before.to_homogeneous()).norm() < 1e-12);
-        told.0.lock().expect("not poisoned").is_connected = false;
+        tracker.0.lock().expect("not poisoned").is_connected = false;
         assert_eq!(device.read(ms(202)), Err(DeviceFault::Lost { age: ms(2) }));
     }
 
     #[test]
     fn a_sensor_out_of_sight_is_a_fault() {
-        let (told, mut device) = device(Anchor::Start);
-        told.tell([0.0; 3], UPRIGHT);
+        let (tracker, mut device) = device(Anchor::Start);
+        tracker.tell([0.0; 3], UPRIGHT);
         assert!(device.read(ms(1)).is_ok());
-        told.tell([0.0; 3], [0.0; 4]);
+        tracker.tell([0.0; 3], [0.0; 4]);
         assert_eq!(device.read(ms(2)), Err(DeviceFault::NotFinite));
         assert_eq!(device.read(ms(3)), Err(DeviceFault::NotFinite));
-        told.tell([0.0; 3], UPRIGHT);
+        tracker.tell([0.0; 3], UPRIGHT);
         assert_eq!(device.read(ms(4)), Err(DeviceFault::Reconnected));
         assert!(device.read(ms(5)).is_ok());
     }
 
     #[test]
     fn a_prop_on_the_workbench_is_where_it_is_seen() {
-        let (told, mut device) = device(Anchor::Workbench);
-        told.tell([0.2, -0.1, 0.4], UPRIGHT);
+        let (tracker, mut device) = device(Anchor::Workbench);
+        tracker.tell([0.2, -0.1, 0.4], UPRIGHT);
         let sample = device.read(ms(1)).expect("a sample");
         // Workbench = origin + 2 · world.
         let wanted = Vector3::new(0.1, 0.15, 0.1);

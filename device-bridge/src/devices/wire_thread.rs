@@ -210,7 +210,7 @@ pub(crate) fn ask_for_real_time(priority: u8, name: &str) {
 }
 
 fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
-    let mut told = String::new();
+    let mut last_lost = String::new();
     while !line.is_over() {
         let begun = monotonic_now();
         let Err(lost) = wire.session(&mut line) else {
@@ -221,9 +221,9 @@ fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
         // One that is lost at once, again and again, is told once.
         let held_on = monotonic_now().saturating_sub(begun) > HELD_ON;
         let lost = lost.to_string();
-        if lost != told || held_on {
+        if lost != last_lost || held_on {
             tracing::warn!("{} is gone: {lost}; looking for it", wire.name());
-            told = lost;
+            last_lost = lost;
         }
         if !line.is_over() {
             thread::sleep(RETRY);

@@ -138,7 +138,7 @@ impl WrenchReader {
 struct Taken {
     wrench: Vector6,
     /// Its time as it was told, and at the earliest: the age counts from the latter.
-    told: Duration,
+    stated: Duration,
     made: Duration,
     sender: u64,
 }
@@ -210,8 +210,8 @@ impl ExternalWrench {
                 WrenchAxes::Fixed(turn) => turned(&turn, &limited),
                 WrenchAxes::Body => limited,
             },
-            made: newest.told,
-            uncertainty: newest.told.saturating_sub(newest.made),
+            made: newest.stated,
+            uncertainty: newest.stated.saturating_sub(newest.made),
             count: self.statistics.taken(),
             settings,
         })
@@ -284,13 +284,13 @@ impl ExternalWrench {
         }
         if let Some(newest) = self.newest
             && newest.sender == sent.sender
-            && made < newest.told
+            && made < newest.stated
         {
             return Err(Refused::WentBack);
         }
         Ok(Taken {
             wrench: sent.wrench,
-            told: made,
+            stated: made,
             made: earliest,
             sender: sent.sender,
         })

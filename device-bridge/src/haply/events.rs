@@ -28,7 +28,7 @@ const MAX_TEXT: usize = 120;
 /// Most values of an event that are told.
 const MAX_VALUES: usize = 8;
 /// Most events that are told in a second; the others are counted.
-const MAX_TOLD: u32 = 10;
+const MAX_LINES: u32 = 10;
 /// Messages that are no events, one after the other, that end a connection.
 const MAX_NONSENSE: u32 = 20;
 /// Between two calls.
@@ -107,13 +107,13 @@ fn plain(text: &str) -> String {
 
 /// Lines of a second, and those beyond.
 #[derive(Default)]
-struct Told {
+struct LineLimit {
     second: Duration,
     lines: u32,
     left_out: u32,
 }
 
-impl Told {
+impl LineLimit {
     /// Whether another line may be told at `now`, and how many were left out in the second before.
     fn another(&mut self, now: Duration) -> (bool, u32) {
         let mut before = 0;
@@ -121,7 +121,7 @@ impl Told {
             before = std::mem::take(&mut self.left_out);
             (self.second, self.lines) = (now, 0);
         }
-        let may = self.lines < MAX_TOLD;
+        let may = self.lines < MAX_LINES;
         if may {
             self.lines += 1;
         } else {
@@ -184,11 +184,11 @@ fn tell(level: tracing::Level, line: &str) {
 
 fn run(address: &ServiceAddress, end: &AtomicBool, tell: &dyn Fn(tracing::Level, &str)) {
     let is_over = || end.load(Ordering::Relaxed);
-    let mut told = Told::default();
+    let mut limit = LineLimit::default();
     while !is_over() {
         if let Some(mut socket) = connect(address) {
             tracing::debug!("listening to the events of the Inverse service at {address}");
-            hear(&mut socket, end, &mut told, tell);
+            hear(&mut socket, end, &mut limit, tell);
         }
         let again = monotonic_now() + RETRY;
         while !is_over() && monotonic_now() < again {
@@ -218,7 +218,7 @@ fn connect(address: &ServiceAddress) -> Option<WebSocket<TcpStream>> {
 fn hear(
     socket: &mut WebSocket<TcpStream>,
     end: &AtomicBool,
-    told: &mut Told,
+    limit: &mut LineLimit,
     tell: &dyn Fn(tracing::Level, &str),
 ) {
     let mut nonsense = 0;
@@ -249,7 +249,7 @@ fn hear(
             continue;
         };
         nonsense = 0;
-        let (may, left_out) = told.another(monotonic_now());
+        let (may, left_out) = limit.another(monotonic_now());
         if left_out > 0 {
             tell(tracing::Level::INFO, &format!("{left_out} events more"));
         }
@@ -318,11 +318,11 @@ mod tests {
             "[".repeat(60_000)
         );
         assert_eq!(ServiceEvent::parse(&deep), None);
-        let mut told = Told::default();
+        let mut limit = LineLimit::default();
         let second = Duration::from_secs(5);
-        let lines = (0..1000).filter(|_| told.another(second).0).count();
-        assert_eq!(lines, MAX_TOLD as usize);
-        assert_eq!(told.another(second * 2), (true, 1000 - MAX_TOLD));
+        let lines = (0..1000).filter(|_| limit.another(second).0).count();
+        assert_eq!(lines, MAX_LINES as usize);
+        assert_eq!(limit.another(second * 2), (true, 1000 - MAX_LINES));
     }
 
     /// A service on a socket: what it says to each who calls, one after the other.

@@ -85,9 +85,9 @@ pub fn service_version(address: &ServiceAddress) -> Result<ServiceVersion, Versi
         .limit(MAX_ANSWER)
         .read_to_string();
     let body = body.map_err(|error| unknown(error.to_string()))?;
-    let told: Answer = serde_json::from_str(&body).map_err(|error| unknown(error.to_string()))?;
-    let found = ServiceVersion::parse(&told.project_version)
-        .ok_or_else(|| unknown(format!("`{}` is none", told.project_version)))?;
+    let answer: Answer = serde_json::from_str(&body).map_err(|error| unknown(error.to_string()))?;
+    let found = ServiceVersion::parse(&answer.project_version)
+        .ok_or_else(|| unknown(format!("`{}` is none", answer.project_version)))?;
     if found < FIRST {
         return Err(VersionError::TooOld {
             address: address.clone(),

@@ -35,7 +35,7 @@ impl Printed {
             line: Vec::with_capacity(MAX_LINE),
             last: Arc::clone(&last),
             second: Duration::ZERO,
-            told: 0,
+            lines: 0,
             left_out: 0,
         };
         // Without the thread the process is stopped by its own lines, and that is told as a device that hangs.
@@ -66,7 +66,7 @@ struct Lines {
     line: Vec<u8>,
     last: Arc<Mutex<VecDeque<String>>>,
     second: Duration,
-    told: usize,
+    lines: usize,
     left_out: u64,
 }
 
@@ -105,10 +105,10 @@ impl Lines {
             if self.left_out > 0 {
                 tracing::info!("{}: {} lines more", self.name, self.left_out);
             }
-            (self.second, self.told, self.left_out) = (now, 0, 0);
+            (self.second, self.lines, self.left_out) = (now, 0, 0);
         }
-        if self.told < MAX_LINES {
-            self.told += 1;
+        if self.lines < MAX_LINES {
+            self.lines += 1;
             tracing::info!("{}: {text}", self.name);
         } else {
             self.left_out += 1;

@@ -198,38 +198,38 @@ impl Arming {
         let passed = passed.min(settings.hold);
         self.last = Some(self.last.map_or(now, |last| last.max(now)));
 
-        let mut told = [None; 2];
+        let mut events = [None; 2];
         let let_go = self.was_held && !situation.held;
         self.was_held = situation.held;
         if self.state.is_off() {
-            told[0] = self.while_off(situation);
-            return told;
+            events[0] = self.while_off(situation);
+            return events;
         }
         if let_go {
-            told[0] = Some(EventKind::DeadManReleased);
+            events[0] = Some(EventKind::DeadManReleased);
         } else if situation.disarm {
-            told[0] = Some(EventKind::Disarmed);
+            events[0] = Some(EventKind::Disarmed);
         }
         self.watch_outage(now, situation);
-        if self.blame(now, settings, situation) {
-            told[1] = Some(EventKind::Arming);
+        if self.follow_causes(now, settings, situation) {
+            events[1] = Some(EventKind::Arming);
         }
         match self.state {
             ArmingState::Arming => {
                 self.gain = (self.gain + ratio(passed, settings.ramp_in)).min(1.0);
                 if self.gain >= 1.0 {
                     self.state = ArmingState::Armed;
-                    told[1] = Some(EventKind::Armed);
+                    events[1] = Some(EventKind::Armed);
                 }
             }
             ArmingState::Holding if self.cause == Cause::Fault && now >= self.fade.since => {
                 self.state = ArmingState::Fading;
-                told[1] = self.fall(now, settings);
+                events[1] = self.fall(now, settings);
             }
-            ArmingState::Fading => told[1] = self.fall(now, settings),
+            ArmingState::Fading => events[1] = self.fall(now, settings),
             _ => {}
         }
-        told
+        events
     }
 
     /// No force: whether it may come.
@@ -271,7 +271,12 @@ impl Arming {
     }
 
     /// Takes the gravest of what is wrong. Whether all is well again after the force had begun to fade.
-    fn blame(&mut self, now: Duration, settings: &SafetySettings, situation: &Situation) -> bool {
+    fn follow_causes(
+        &mut self,
+        now: Duration,
+        settings: &SafetySettings,
+        situation: &Situation,
+    ) -> bool {
         let falling = matches!(self.state, ArmingState::Holding | ArmingState::Fading);
         let known = falling.then_some(self.cause);
         if let Some(since) = situation.fault_since {

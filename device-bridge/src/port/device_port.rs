@@ -8,7 +8,7 @@ use super::arming::{Arming, ArmingState, CommandSource, Situation};
 use super::buttons::Buttons;
 use super::clamp::{Clamped, clamp};
 use super::energy::EnergyObserver;
-use super::event::{EventKind, Events, Spell, Teller, kind_of_fault};
+use super::event::{EdgeDetector, EventKind, Events, TickEvents, kind_of_fault};
 use super::motion::Motion;
 use super::passivity::PassivityController;
 use super::settings::SafetySettings;
@@ -55,7 +55,7 @@ pub struct DevicePort {
     motion: Motion,
     energy: EnergyObserver,
     spells: Spells,
-    teller: Teller,
+    tick_events: TickEvents,
     last_tick: Option<Duration>,
     /// The loop ended in good order after the last tick, the force led down: what passes until the next tick is a pause, no stall.
     released: bool,
@@ -79,13 +79,13 @@ pub struct DevicePort {
 /// What is told when it begins.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spells {
-    not_finite: Spell,
-    stale: [Spell; 3],
-    force: Spell,
-    torque: Spell,
-    force_slew: Spell,
-    torque_slew: Spell,
-    passivity: Spell,
+    not_finite: EdgeDetector,
+    stale: [EdgeDetector; 3],
+    force: EdgeDetector,
+    torque: EdgeDetector,
+    force_slew: EdgeDetector,
+    torque_slew: EdgeDetector,
+    passivity: EdgeDetector,
 }
 
 impl DevicePort {
@@ -115,7 +115,7 @@ impl DevicePort {
             motion: Motion::default(),
             energy: EnergyObserver::new(reference_point),
             spells: Spells::default(),
-            teller: Teller::default(),
+            tick_events: TickEvents::default(),
             last_tick: None,
             released: false,
             sample: at_rest(start),
@@ -206,12 +206,12 @@ impl DevicePort {
         now: Duration,
         command: impl FnOnce(&Reading) -> Option<Command>,
     ) -> TickReport {
-        self.teller.begin_tick(now);
+        self.tick_events.begin_tick(now);
         let passed = now.saturating_sub(self.last_tick.unwrap_or(now));
         self.last_tick = Some(now);
         let paused = std::mem::take(&mut self.released);
         if passed > self.settings.hold && !paused {
-            self.teller
+            self.tick_events
                 .tell(EventKind::PortStalled, passed.as_secs_f64());
         }
         self.motion.fade(passed);
@@ -234,7 +234,7 @@ impl DevicePort {
             wrench,
             felt,
             state: self.arming.state(),
-            events: *self.teller.events(),
+            events: *self.tick_events.events(),
         }
     }
 
@@ -275,7 +275,7 @@ impl DevicePort {
                     self.settings.contact.radius_of_gyration,
                 );
                 if self.fault.take().is_some() {
-                    self.teller.tell(EventKind::DeviceBack, 0.0);
+                    self.tick_events.tell(EventKind::DeviceBack, 0.0);
                 }
             }
             Verdict::Same => {}
@@ -290,7 +290,7 @@ impl DevicePort {
                 }
                 if self.fault.is_none() {
                     let (kind, value) = kind_of_fault(&fault);
-                    self.teller.tell(kind, value);
+                    self.tick_events.tell(kind, value);
                 }
                 self.fault.get_or_insert(fault);
             }
@@ -312,7 +312,7 @@ impl DevicePort {
         let (situation, taken) = self.situation(now, command);
         let changes = self.arming.step(now, &self.settings, &situation);
         for kind in changes.into_iter().flatten() {
-            self.teller.tell(kind, 0.0);
+            self.tick_events.tell(kind, 0.0);
         }
         if let Some(wrench) = taken
             && !self.arming.keeps_last_wrench()
@@ -387,9 +387,9 @@ impl DevicePort {
                 (debt > 0.0).then_some(debt),
             ),
         ];
-        for (spell, kind, value) in acting {
-            if spell.begins(now, value.is_some()) {
-                self.teller.tell(kind, value.unwrap_or(0.0));
+        for (detector, kind, value) in acting {
+            if detector.begins(now, value.is_some()) {
+                self.tick_events.tell(kind, value.unwrap_or(0.0));
             }
         }
     }
@@ -403,7 +403,7 @@ impl DevicePort {
         let finite = command
             .is_none_or(|command| is_finite(&command.wrench) && is_finite(&command.external));
         if self.spells.not_finite.begins(now, !finite) {
-            self.teller.tell(EventKind::WrenchNotFinite, 0.0);
+            self.tick_events.tell(EventKind::WrenchNotFinite, 0.0);
         }
         let fresh = command.map(|command| freshness(now, &command, &self.settings));
         let mut taken = command.map(|command| command.wrench).filter(|_| finite);
@@ -414,7 +414,7 @@ impl DevicePort {
                 age,
                 since,
             }) => {
-                let (spell, kind) = match missing {
+                let (detector, kind) = match missing {
                     Missing::Command => (0, EventKind::ForceStale),
                     Missing::Constraints => (1, EventKind::ConstraintsStale),
                     Missing::NotOnClock => (2, EventKind::CommandNotOnClock),
@@ -429,9 +429,9 @@ impl DevicePort {
                             .map_or(since, |made| since.min(too_old(made))),
                     );
                 }
-                let begins = self.spells.stale[spell].begins(now, true);
+                let begins = self.spells.stale[detector].begins(now, true);
                 if begins && !self.arming.state().is_off() {
-                    self.teller.tell(kind, age.as_secs_f64());
+                    self.tick_events.tell(kind, age.as_secs_f64());
                 }
             }
             Some(_) => {}

@@ -287,13 +287,13 @@ impl Events {
 
 /// Numbers events and keeps those of this tick. No allocation.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Teller {
+pub(super) struct TickEvents {
     now: Duration,
-    told: u64,
+    count: u64,
     events: Events,
 }
 
-impl Teller {
+impl TickEvents {
     /// Forgets the last tick's.
     pub(super) fn begin_tick(&mut self, now: Duration) {
         self.now = now;
@@ -302,9 +302,9 @@ impl Teller {
 
     /// Tells one.
     pub(super) fn tell(&mut self, kind: EventKind, value: f64) {
-        self.told += 1;
+        self.count += 1;
         self.events.push(SafetyEvent {
-            number: self.told,
+            number: self.count,
             time: self.now,
             kind,
             value,
@@ -317,17 +317,17 @@ impl Teller {
     }
 }
 
-/// Something that comes and goes: it begins with its first tick, and is over once it has been gone for [`Spell::QUIET`].
+/// Something that comes and goes: it begins with its first tick, and is over once it has been gone for [`EdgeDetector::QUIET`].
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Spell {
+pub(crate) struct EdgeDetector {
     last: Option<Duration>,
 }
 
-impl Spell {
-    /// Shorter gaps are one spell: a limit that chatters is told once.
+impl EdgeDetector {
+    /// Shorter gaps are one edges: a limit that chatters is told once.
     const QUIET: Duration = Duration::from_millis(100);
 
-    /// Whether a spell begins with this tick.
+    /// Whether a edges begins with this tick.
     pub(crate) fn begins(&mut self, now: Duration, is_on: bool) -> bool {
         if !is_on {
             return false;
@@ -353,7 +353,7 @@ mod tests {
     #[test]
     fn a_string_fault_is_its_own_kind_and_names_the_string() {
         use taut_spidar::StringFault;
-        let told = |fault| {
+        let kind_of = |fault| {
             let (kind, value) = kind_of_fault(&DeviceFault::Strings(fault));
             assert_eq!(kind, EventKind::DeviceStrings);
             assert!(kind.is_fault() && !kind.is_good_news());
@@ -365,12 +365,12 @@ mod tests {
             };
             event.to_string()
         };
-        let slack = told(StringFault::Slack {
+        let slack = kind_of(StringFault::Slack {
             string: 4,
             tension: 0.01,
         });
         assert!(slack.ends_with("the force fades (string 5)"), "{slack}");
-        let nobody = told(StringFault::NotConverged);
+        let nobody = kind_of(StringFault::NotConverged);
         assert!(nobody.ends_with("the force fades"), "{nobody}");
         assert!(!slack.contains("far end"));
         let far = kind_of_fault(&DeviceFault::ReportedFault);
@@ -394,11 +394,11 @@ mod tests {
 
     #[test]
     fn a_limit_that_chatters_is_told_once() {
-        let mut spell = Spell::default();
-        let told: Vec<u64> = (0..500)
-            .filter(|ms| spell.begins(Duration::from_millis(*ms), *ms < 200 && ms % 3 == 0))
+        let mut edges = EdgeDetector::default();
+        let begun: Vec<u64> = (0..500)
+            .filter(|ms| edges.begins(Duration::from_millis(*ms), *ms < 200 && ms % 3 == 0))
             .collect();
-        assert_eq!(told, [0]);
-        assert!(spell.begins(Duration::from_millis(500), true));
+        assert_eq!(begun, [0]);
+        assert!(edges.begins(Duration::from_millis(500), true));
     }
 }

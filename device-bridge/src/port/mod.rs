@@ -35,7 +35,7 @@ pub use arming::{ArmingState, CommandSource, fade_share};
 pub use clamp::within_limits;
 pub use device_port::{DevicePort, Reading, TickReport};
 pub use energy::EnergyObserver;
-pub(crate) use event::Spell;
+pub(crate) use event::EdgeDetector;
 pub use event::{EventKind, Events, MAX_EVENTS_PER_TICK, SafetyEvent, kind_of_fault};
 pub use passivity::{Passivity, PassivitySettings};
 pub use settings::{ContactBound, Rearm, SafetySettings};

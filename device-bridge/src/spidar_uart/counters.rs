@@ -133,8 +133,8 @@ impl Counters {
 
     /// As a hand goes on. After a longer time no more is allowed than after a short one, so that little passes by chance.
     fn is_smooth(&self, change: &[i32; STRINGS], rates: &[f64; STRINGS], span: f64) -> bool {
-        let foretold = span.min(LONGEST_STEP);
-        let most = HARDEST / self.metres_per_count * foretold * foretold + SLACK;
+        let extrapolated = span.min(LONGEST_STEP);
+        let most = HARDEST / self.metres_per_count * extrapolated * extrapolated + SLACK;
         let off = |i: usize| (f64::from(change[i]) - rates[i] * span).abs();
         (0..STRINGS).all(|i| off(i) <= most)
     }

@@ -455,9 +455,9 @@ async fn a_flood_of_reports_is_read_slowly_and_costs_others_nothing() {
         ..ClientStats::default()
     };
     let began = Instant::now();
-    let (mut taken, mut told) = (0_u64, 0_u64);
-    let mut quiet_told = false;
-    while began.elapsed() < Duration::from_secs(1) || !quiet_told {
+    let (mut taken, mut reports) = (0_u64, 0_u64);
+    let mut quiet_reported = false;
+    while began.elapsed() < Duration::from_secs(1) || !quiet_reported {
         assert!(began.elapsed() < PATIENCE, "the quiet one is not heard");
         while flooding.post_stats(stats(taken)) {
             taken += 1;
@@ -465,21 +465,21 @@ async fn a_flood_of_reports_is_read_slowly_and_costs_others_nothing() {
                 tokio::task::yield_now().await;
             }
         }
-        if !quiet_told {
+        if !quiet_reported {
             quiet.post_stats(stats(7));
         }
         while let Some(event) = server.try_event() {
             match event {
-                LinkEvent::Stats { node, .. } if node == "left" => told += 1,
-                LinkEvent::Stats { node, .. } if node == "right" => quiet_told = true,
+                LinkEvent::Stats { node, .. } if node == "left" => reports += 1,
+                LinkEvent::Stats { node, .. } if node == "right" => quiet_reported = true,
                 _ => {}
             }
         }
         tokio::time::sleep(Duration::from_millis(2)).await;
     }
     let allowed = 256.0 + 100.0 * began.elapsed().as_secs_f64() + 1.0;
-    assert!(told as f64 <= allowed, "{told} reports were taken");
-    assert!(taken > told, "the flood was larger than what was read");
+    assert!(reports as f64 <= allowed, "{reports} reports were taken");
+    assert!(taken > reports, "the flood was larger than what was read");
     assert!(server.counters().control_delayed > 0);
     assert_eq!(server.counters().events_dropped, 0);
     assert_eq!(flooding.is_closed(), None, "slowed, not thrown out");

@@ -324,13 +324,13 @@ fn nodes_swap_together_when_the_server_dies_and_when_their_leader_dies_until_the
 
     let addresses = leader.die();
     // The first that joined leads; its frames are above all that the server can have released meanwhile.
-    let reign = before + FRAMES_LEFT_OUT / 2;
+    let led_from = before + FRAMES_LEFT_OUT / 2;
     let everybody = [&left, &middle, &right];
     let many = |screens: &[&Screen], frame, count| {
         let enough = |screen: &&Screen| screen.above(frame).len() >= count;
         screens.iter().all(enough)
     };
-    until("frames without a server", || many(&everybody, reign, 40));
+    until("frames without a server", || many(&everybody, led_from, 40));
     // Also after the link has been given up.
     until("being lost", || {
         everybody
@@ -339,8 +339,8 @@ fn nodes_swap_together_when_the_server_dies_and_when_their_leader_dies_until_the
     });
     let given_up = everybody.map(Screen::newest).into_iter().max().unwrap_or(0);
     until("frames without a link", || many(&everybody, given_up, 20));
-    assert_together(&everybody, reign, 40);
-    let held = left.above(reign)[0].state_hash;
+    assert_together(&everybody, led_from, 40);
+    let held = left.above(led_from)[0].state_hash;
     assert!(all(&sent).contains(&held), "the server sent it");
     assert!(
         left.above(given_up)
@@ -349,12 +349,14 @@ fn nodes_swap_together_when_the_server_dies_and_when_their_leader_dies_until_the
     );
 
     // The one that leads dies: the next takes over.
-    let reign = given_up + FRAMES_LEFT_OUT / 2;
+    let led_from = given_up + FRAMES_LEFT_OUT / 2;
     left.die();
     let two = [&middle, &right];
-    until("frames without the first leader", || many(&two, reign, 40));
-    assert_together(&two, reign, 30);
-    assert_eq!(middle.above(reign)[0].state_hash, held);
+    until("frames without the first leader", || {
+        many(&two, led_from, 40)
+    });
+    assert_together(&two, led_from, 30);
+    assert_eq!(middle.above(led_from)[0].state_hash, held);
 
     // The next server: everybody comes back, and is in step.
     let again = Leader::start(Some(addresses));

@@ -62,8 +62,8 @@ pub(crate) fn say_without_waiting() {
 /// At the end of the process: waits for a backtrace that is being read.
 pub(crate) fn flush() {
     if let Some(reader) = READER.get().filter(|reader| reader.is_busy()) {
-        let (told, done) = sync_channel(1);
-        if reader.jobs.try_send(Job::Tell(told)).is_ok() {
+        let (when_done, done) = sync_channel(1);
+        if reader.jobs.try_send(Job::Tell(when_done)).is_ok() {
             let _ = done.recv_timeout(LONGEST_WAIT);
         }
     }
@@ -98,8 +98,8 @@ fn read(jobs: &Receiver<Job>, busy: &AtomicBool) {
                 crate::say(&format!("backtrace of the thread {name}:\n{trace}"));
                 busy.store(false, Ordering::Release);
             }
-            Job::Tell(told) => {
-                let _ = told.try_send(());
+            Job::Tell(when_done) => {
+                let _ = when_done.try_send(());
             }
         }
     }

@@ -60,7 +60,7 @@ impl Writer {
             busy: busy.clone(),
             lost: lost.clone(),
             status: status.clone(),
-            told: 0,
+            reported: 0,
         };
         let (lines, guard) = NonBlockingBuilder::default()
             .lossy(true)
@@ -124,7 +124,7 @@ struct Telling<W> {
     busy: Arc<Mutex<Option<Busy>>>,
     lost: Arc<OnceLock<ErrorCounter>>,
     status: Arc<Mutex<Status>>,
-    told: usize,
+    reported: usize,
 }
 
 impl<W: Write> Telling<W> {
@@ -158,14 +158,14 @@ impl<W: Write> Write for Telling<W> {
             since: Instant::now(),
             lost: lost as u64,
         });
-        if lost > self.told {
-            let since = lost - self.told;
-            let told = writeln!(
+        if lost > self.reported {
+            let since = lost - self.reported;
+            let reported = writeln!(
                 self.to,
                 "taut: {since} lines were lost here: the terminal or the journal did not take them"
             );
-            if told.is_ok() {
-                self.told = lost;
+            if reported.is_ok() {
+                self.reported = lost;
             }
         }
         // A terminal that is gone has nobody to be told.
@@ -278,8 +278,8 @@ mod tests {
         drop(writer);
         reading.join().expect("no panic");
         let came = lock(&came);
-        let told = |line: &String| line.contains("lines were lost here");
-        assert!(came.iter().any(told), "it was told");
+        let reported = |line: &String| line.contains("lines were lost here");
+        assert!(came.iter().any(reported), "it was told");
         let shown = came.iter().filter(|line| line.starts_with('x')).count() as u64;
         assert_eq!(shown + lost, 10_000, "each line came or was counted");
     }

@@ -14,7 +14,7 @@
 //! it draws the newest state whenever it can, is not waited for, and sets nobody's pace, until it has drawn as many frames in a row as fast as it says.
 
 use super::{
-    Arrive, FARTHEST_AHEAD, FRAMES_LEFT_OUT, FrameSkew, LEAD_NS, MAX_MEMBERS, MOST_REIGNS_AHEAD,
+    Arrive, FARTHEST_AHEAD, FRAMES_LEFT_OUT, FrameSkew, LEAD_NS, MAX_MEMBERS, MOST_TERMS_AHEAD,
     MemberStatus, NodeState, RECLAIM_NS, ReleaseHead, SILENCE_NS, SWAP_TOLD_NS, TERMS_LEFT_OUT,
     member::Member,
     skew::{OpenFrame, Swaps},
@@ -72,7 +72,7 @@ pub enum Answer {
     Counted,
     /// The node missed a RELEASE: send it the newest again, to it alone.
     Repeat,
-    /// It names a frame that nobody began or a reign that nobody can have begun: it has no effect.
+    /// It names a frame that nobody began or a term that nobody can have begun: it has no effect.
     Refused,
     /// There are [`MAX_MEMBERS`] already: the node swaps on its own.
     Full,
@@ -104,7 +104,7 @@ pub struct Counts {
     pub freed: u64,
     /// ARRIVEs that were refused.
     pub refused: u64,
-    /// Reigns of nodes that the server ended.
+    /// Terms of nodes that the server ended.
     pub reclaimed: u64,
 }
 
@@ -201,7 +201,7 @@ impl Master {
                 self.counts.refused += 1;
                 return (Answer::Refused, None);
             }
-            // It knows no frame of this reign: the newest RELEASE tells it where we are.
+            // It knows no frame of this term: the newest RELEASE tells it where we are.
             let answer = if begun {
                 Answer::Repeat
             } else {
@@ -209,10 +209,10 @@ impl Master {
             };
             return (answer, None);
         }
-        let lit_ns = self.told(now_ns, arrive.lit_ns);
+        let lit_ns = self.plausible(now_ns, arrive.lit_ns);
         let lit = self.lights.tell(session, arrive.lit_frame, lit_ns);
         self.keep_light(lit);
-        let told_ns = self.told(now_ns, arrive.swapped_ns);
+        let told_ns = self.plausible(now_ns, arrive.swapped_ns);
         let skew = self.swaps.tell(session, arrive.swapped_frame, told_ns);
         if let Some(skew) = &skew {
             self.skew_ns = u32::try_from(skew.skew_ns).unwrap_or(u32::MAX);
@@ -357,7 +357,7 @@ impl Master {
     }
 
     /// A time as the node tells it; 0 if it does not know, or if that cannot be.
-    fn told(&self, now_ns: u64, told_ns: u64) -> u64 {
+    fn plausible(&self, now_ns: u64, told_ns: u64) -> u64 {
         let lately = now_ns.abs_diff(told_ns) <= SWAP_TOLD_NS;
         // Where a node leads, its clock is not the session's, and nobody asks.
         match lately || self.newest.master != SERVER_SENDER {
@@ -398,13 +398,13 @@ impl Master {
         }
     }
 
-    /// The server was silent, and a node led: from its next RELEASE on the server does again, in a reign above all. `false` if the node claims what
+    /// The server was silent, and a node led: from its next RELEASE on the server does again, in a term above all. `false` if the node claims what
     /// cannot be.
     fn reclaim(&mut self, now_ns: u64, arrive: &Arrive) -> bool {
         if self.newest.master != SERVER_SENDER || arrive.term <= self.newest.term {
             return true;
         }
-        if !near(self.newest.term, arrive.term, MOST_REIGNS_AHEAD)
+        if !near(self.newest.term, arrive.term, MOST_TERMS_AHEAD)
             || !near(self.newest.frame, arrive.frame, FARTHEST_AHEAD)
         {
             return false;
@@ -499,7 +499,7 @@ impl Master {
             expected,
             ready_ns,
             state_time_ns,
-            told: ArrayVec::new(),
+            swaps: ArrayVec::new(),
         };
         let old = self.lights.follow(shown.clone());
         self.keep_light(old);

@@ -64,7 +64,7 @@ wire_ranged!(Arrive {
 /// What a RELEASE says beside the state.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ReleaseHead {
-    /// Number of the master's reign: 1 is the server's, each successor adds one. Of two masters the higher term is followed, then the lower
+    /// Number of the master's term: 1 is the server's, each successor adds one. Of two masters the higher term is followed, then the lower
     /// `master`.
     pub term: u64,
     /// Session number of the master; 0 is the server.

@@ -10,7 +10,7 @@
 //! for it until it is back on time, and forgets one that is silent; a node that hears nothing draws on its own again.
 //!
 //! When the master is gone, the first of the nodes leads with the state that was held last ([`Succession`]), from node to node; when the server
-//! is there again, the nodes appeal to it ([`Node::appeal`]), and it takes the frames back in a reign above theirs.
+//! is there again, the nodes appeal to it ([`Node::appeal`]), and it takes the frames back in a term above theirs.
 //!
 //! Pure state machines, times are arguments: [`Master`] (session time), [`Node`] and [`Succession`] (any monotonic clock of the node).
 //!
@@ -57,16 +57,16 @@ pub const LEAD_NS: u64 = 300_000;
 pub const SUCCESSION_NS: u64 = 150_000_000;
 /// Time between two signs of life of a node that leads, and of those that follow it, ns.
 pub const SIGN_NS: u64 = 50_000_000;
-/// Least time between two returns of the server to a reign that nodes began without it, ns: a node that claims such reigns costs the
+/// Least time between two returns of the server to a term that nodes began without it, ns: a node that claims such terms costs the
 /// others a frame now and then, and no more.
 pub const RECLAIM_NS: u64 = 1_000_000_000;
-/// Frame numbers that a new reign leaves out: more than any RELEASE that it may have missed.
+/// Frame numbers that a new term leaves out: more than any RELEASE that it may have missed.
 pub const FRAMES_LEFT_OUT: u64 = 1024;
-/// Reigns that the server leaves out when it takes the frames back: more than nodes may have begun meanwhile, so that no two masters have one term.
+/// Terms that the server leaves out when it takes the frames back: more than nodes may have begun meanwhile, so that no two masters have one term.
 pub const TERMS_LEFT_OUT: u64 = 64;
-/// Most reigns that a node may say it is ahead of the known one: more than any cluster begins while one of its nodes hears nothing, and with
+/// Most terms that a node may say it is ahead of the known one: more than any cluster begins while one of its nodes hears nothing, and with
 /// [`RECLAIM_NS`] too few to come near the end of the numbers in the life of a workbench.
-pub const MOST_REIGNS_AHEAD: u64 = 1024;
+pub const MOST_TERMS_AHEAD: u64 = 1024;
 /// Longest that a swap may lie in the past when it is told, ns; one that lies further, or in the future, is not believed.
 pub const SWAP_TOLD_NS: u64 = 10_000_000_000;
 /// Farthest that a node may say the frames are ahead of those that are known: a year of 120 frames per second.

@@ -208,7 +208,7 @@ impl Node {
         next_ns
     }
 
-    /// The message to the server that is due while another node leads: it names that reign, so that a server that is there again takes the
+    /// The message to the server that is due while another node leads: it names that term, so that a server that is there again takes the
     /// frames back.
     pub fn appeal(&mut self, now_ns: u64) -> Option<Arrive> {
         let newest = self.newest.as_ref()?;

@@ -46,7 +46,7 @@ pub(super) struct OpenFrame {
     /// Sample time of its state, ns.
     pub(super) state_time_ns: u64,
     /// Session number and session time of each swap that was told.
-    pub(super) told: ArrayVec<(u16, u64), MAX_MEMBERS>,
+    pub(super) swaps: ArrayVec<(u16, u64), MAX_MEMBERS>,
 }
 
 impl Swaps {
@@ -61,12 +61,12 @@ impl Swaps {
     pub(super) fn tell(&mut self, session: u16, frame: u64, swap_ns: u64) -> Option<FrameSkew> {
         let index = self.open.iter().position(|open| open.frame == frame)?;
         let open = &mut self.open[index];
-        let told_before = open.told.iter().any(|(other, _)| *other == session);
-        if swap_ns == 0 || told_before || !open.expected.contains(&session) {
+        let known = open.swaps.iter().any(|(other, _)| *other == session);
+        if swap_ns == 0 || known || !open.expected.contains(&session) {
             return None;
         }
-        open.told.push((session, swap_ns)); // as many as are expected, at most
-        if open.told.len() < open.expected.len() {
+        open.swaps.push((session, swap_ns)); // as many as are expected, at most
+        if open.swaps.len() < open.expected.len() {
             return None;
         }
         self.open.remove(index).skew()
@@ -76,13 +76,13 @@ impl Swaps {
 impl OpenFrame {
     /// `None` where fewer than two told.
     fn skew(&self) -> Option<FrameSkew> {
-        let first = self.told.iter().map(|(_, ns)| *ns).min()?;
-        let last = self.told.iter().map(|(_, ns)| *ns).max()?;
-        let swaps = self.told.iter().map(|(session, ns)| NodeSwap {
+        let first = self.swaps.iter().map(|(_, ns)| *ns).min()?;
+        let last = self.swaps.iter().map(|(_, ns)| *ns).max()?;
+        let swaps = self.swaps.iter().map(|(session, ns)| NodeSwap {
             session: *session,
             after_first_ns: ns - first,
         });
-        (self.told.len() > 1).then(|| FrameSkew {
+        (self.swaps.len() > 1).then(|| FrameSkew {
             frame: self.frame,
             skew_ns: last - first,
             overhead_ns: last.saturating_sub(self.ready_ns),

@@ -2,12 +2,12 @@
 //!
 //! Nobody votes: the nodes know each other from the last RELEASE, and each waits its turn. The first in order stands after [`SUCCESSION_NS`] of
 //! silence, each further one a third of that later. A master that hears of one with a higher term, or with the same term and a lower number,
-//! resigns. So the cluster has one master again as soon as the living hear each other. Should two reign for a while, their frames have
+//! resigns. So the cluster has one master again as soon as the living hear each other. Should two lead for a while, their frames have
 //! different ([`ReleaseHead::rank`], frame), and each node shows only ascending ones.
 //!
 //! Source: Garcia-Molina 1982 (bully election), with time-outs instead of messages.
 
-use super::{FARTHEST_AHEAD, FRAMES_LEFT_OUT, MOST_REIGNS_AHEAD, ReleaseHead, SUCCESSION_NS};
+use super::{FARTHEST_AHEAD, FRAMES_LEFT_OUT, MOST_TERMS_AHEAD, ReleaseHead, SUCCESSION_NS};
 use crate::group::SERVER_SENDER;
 
 /// Turns that fit into the silence before the first: 50 ms from one to the next by default. A RELEASE of the earlier one is there long before.
@@ -38,7 +38,7 @@ pub struct Succession {
     silence_ns: u64,
     heard_ns: u64,
     newest: Option<ReleaseHead>,
-    reign: Option<u64>,
+    leading: Option<u64>,
 }
 
 impl Succession {
@@ -49,7 +49,7 @@ impl Succession {
             silence_ns: SUCCESSION_NS,
             heard_ns: now_ns,
             newest: None,
-            reign: None,
+            leading: None,
         }
     }
 
@@ -70,15 +70,15 @@ impl Succession {
         let silent = now_ns.saturating_sub(self.heard_ns) >= self.silence_ns / 3 * 2;
         head.master == sender
             && sender != SERVER_SENDER
-            && near(newest.term, head.term, MOST_REIGNS_AHEAD)
+            && near(newest.term, head.term, MOST_TERMS_AHEAD)
             && near(newest.frame, head.frame, FARTHEST_AHEAD)
             && head.period_us <= newest.period_us
             && (newest.master != SERVER_SENDER || silent)
     }
 
     /// Whether this node leads.
-    pub fn reigns(&self) -> bool {
-        self.reign.is_some()
+    pub fn leads(&self) -> bool {
+        self.leading.is_some()
     }
 
     /// Any authentic datagram of the present master came.
@@ -104,14 +104,14 @@ impl Succession {
         let Some(newest) = &self.newest else {
             return Successor::No; // never part of anything
         };
-        if let Some(term) = self.reign {
+        if let Some(term) = self.leading {
             let own = ReleaseHead {
                 term,
                 master: self.session,
                 ..ReleaseHead::default()
             };
             if newest.rank() > own.rank() {
-                self.reign = None;
+                self.leading = None;
                 return Successor::Resign;
             }
             return Successor::No;
@@ -124,7 +124,7 @@ impl Succession {
             return Successor::No;
         }
         let term = newest.term + 1; // no decoder lets a number near the end pass
-        self.reign = Some(term);
+        self.leading = Some(term);
         Successor::Stand {
             term,
             first: newest.frame + FRAMES_LEFT_OUT,
@@ -134,7 +134,7 @@ impl Succession {
     /// How many stand before this node; `None` if it takes no part.
     fn turn(&self, newest: &ReleaseHead) -> Option<u64> {
         let place = newest.place(self.session)?;
-        // A node that reigned and is silent is gone: it does not stand before the others.
+        // A node that led and is silent is gone: it does not stand before the others.
         let gone = newest
             .place(newest.master)
             .is_some_and(|master| master < place);

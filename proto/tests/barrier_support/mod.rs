@@ -107,7 +107,7 @@ pub fn any_world_whose_server_pauses() -> impl Strategy<Value = World> {
     })
 }
 
-/// When, of which reign, which frame.
+/// When, of which term, which frame.
 type Moment = (u64, (u64, u16), u64);
 
 /// What was seen of the outside.
@@ -115,9 +115,9 @@ type Moment = (u64, (u64, u16), u64);
 pub struct Seen {
     /// RELEASEs as sent: when, rank, frame.
     releases: Vec<Moment>,
-    /// What a frame of a reign shows, by all nodes that showed it.
+    /// What a frame of a term shows, by all nodes that showed it.
     states: HashMap<((u64, u16), u64), Vec<u64>>,
-    /// When each node showed which frame of which reign.
+    /// When each node showed which frame of which term.
     shown: BTreeMap<u16, Vec<Moment>>,
     mismatches: u64,
     /// Longest that a frame stayed open beyond what the master allows, ns.
@@ -172,7 +172,7 @@ impl Network {
 }
 
 /// A master with what it sends.
-struct Reign {
+struct Leading {
     master: Master,
     state: Newest,
     /// What the newest RELEASE carried.
@@ -189,10 +189,10 @@ struct Screen {
     plan: NodePlan,
     node: Node,
     succession: Succession,
-    reign: Option<Reign>,
+    leading: Option<Leading>,
     /// State of the newest RELEASE.
     tuple: Newest,
-    /// What is being drawn: until when, frame, reign, state.
+    /// What is being drawn: until when, frame, term, state.
     drawing: Option<(u64, u64, (u64, u16), Newest)>,
     drawn: Option<(u64, (u64, u16), Newest)>,
     heard_server: u64,
@@ -230,7 +230,7 @@ impl World {
             delay: self.delay,
             under_way: Vec::new(),
         };
-        let mut server = Reign {
+        let mut server = Leading {
             master: Master::new(self.settings(), SERVER, 1, 1),
             state: Newest::default(),
             sent: Newest::default(),
@@ -245,7 +245,7 @@ impl World {
                 plan: plan.clone(),
                 node: Node::new(id, 0),
                 succession: Succession::new(id, plan.starts),
-                reign: None,
+                leading: None,
                 tuple: Newest::default(),
                 drawing: None,
                 drawn: None,
@@ -283,7 +283,7 @@ impl World {
         &self,
         now: u64,
         packet: Packet,
-        server: &mut Reign,
+        server: &mut Leading,
         screens: &mut [Screen],
         network: &mut Network,
     ) {
@@ -296,9 +296,9 @@ impl World {
             Packet::Arrive(from, to, arrive) => {
                 let screen = &mut screens[usize::from(to) - 1];
                 if screen.is_up(now)
-                    && let Some(reign) = &mut screen.reign
+                    && let Some(term) = &mut screen.leading
                 {
-                    reign.answer(now, from, &arrive, network);
+                    term.answer(now, from, &arrive, network);
                 }
             }
             Packet::Release(to, head, state) => {
@@ -325,12 +325,12 @@ impl World {
         if self.server_dies.is_some() || self.server_pauses.is_some() {
             match screen.succession.poll(now) {
                 Successor::No => {}
-                Successor::Resign => screen.reign = None,
+                Successor::Resign => screen.leading = None,
                 Successor::Stand { term, first } => {
                     let mut master = Master::new(self.settings(), screen.id, term, first);
                     let members = screen.node.newest().map(|newest| newest.members.clone());
                     master.expect(now, &members.unwrap_or_default());
-                    screen.reign = Some(Reign {
+                    screen.leading = Some(Leading {
                         master,
                         state: screen.tuple,
                         sent: screen.tuple,
@@ -340,8 +340,8 @@ impl World {
                     });
                 }
             }
-            if let Some(reign) = &mut screen.reign {
-                reign.lead(now, network, seen);
+            if let Some(term) = &mut screen.leading {
+                term.lead(now, network, seen);
             }
         }
 
@@ -395,7 +395,7 @@ impl World {
     }
 }
 
-impl Reign {
+impl Leading {
     fn answer(&mut self, now: u64, from: u16, arrive: &Arrive, network: &mut Network) {
         let (answer, _) = self.master.arrive(now, from, arrive);
         if answer == Answer::Repeat

@@ -1,7 +1,7 @@
 //! Every control message.
 
 use taut_proto::{
-    ClientStats, ControlMessage, CouplingOffer, EventsTold, MeshHash, PROTOCOL_VERSION, Refusal,
+    ClientStats, ControlMessage, CouplingOffer, EventBatch, MeshHash, PROTOCOL_VERSION, Refusal,
     Role, Transport, VersionRange,
     control::{
         ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, StatesBy,
@@ -105,7 +105,7 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         ("hello_granted", ControlMessage::Hello(granted)),
         (
             "events",
-            ControlMessage::Events(EventsTold {
+            ControlMessage::Events(EventBatch {
                 after: 16,
                 records: hot().events.to_vec(),
             }),

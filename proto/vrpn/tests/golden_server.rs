@@ -142,9 +142,9 @@ fn reports_have_the_bytes_of_the_protocol() {
         xyz.to_owned(),
         xyzw.to_owned(),
     ];
-    let mut told = Vec::new();
-    session.take_datagram(&mut told);
-    assert_eq!(told, bytes(&datagram.concat()));
+    let mut written = Vec::new();
+    session.take_datagram(&mut written);
+    assert_eq!(written, bytes(&datagram.concat()));
     let button = header(0x20, 2, 6) + "0000000300000001";
     assert_eq!(session.pending(), bytes(&button));
 }

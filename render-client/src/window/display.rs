@@ -8,7 +8,7 @@ use winit::monitor::MonitorHandle;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use super::Plan;
-use super::light::{Light, Untold};
+use super::light::{Light, NoFeedback};
 use crate::canvas::target_of;
 use crate::error::RenderError;
 use crate::monitor;
@@ -23,7 +23,7 @@ pub(super) struct Display {
     pub(super) renderer: Renderer,
     pub(super) panes: Vec<Pane>,
     /// Where the window system tells when pictures lit up; else why not.
-    pub(super) light: Result<Light, Untold>,
+    pub(super) light: Result<Light, NoFeedback>,
 }
 
 /// One window.

@@ -32,8 +32,8 @@ const FARTHEST: Duration = Duration::from_secs(10);
 
 /// Asks the compositor of the node's windows.
 pub(super) struct Light {
-    queue: EventQueue<Told>,
-    told: Told,
+    queue: EventQueue<Feedback>,
+    feedback: Feedback,
     presentation: WpPresentation,
     /// What the others stand on: dropped after them.
     foreign: Foreign,
@@ -41,7 +41,7 @@ pub(super) struct Light {
 
 /// Why nobody tells when pictures light up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Untold {
+pub(super) enum NoFeedback {
     /// X11, or another window system that is not Wayland.
     NotWayland,
     /// A compositor without `wp_presentation`.
@@ -50,7 +50,7 @@ pub(super) enum Untold {
     NoClock,
 }
 
-impl fmt::Display for Untold {
+impl fmt::Display for NoFeedback {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NotWayland => "this window system is not Wayland, which alone tells",
@@ -73,7 +73,7 @@ pub(super) struct Lit {
 
 /// What the compositor has told.
 #[derive(Debug, Default)]
-struct Told {
+struct Feedback {
     clock: Option<ClockId>,
     /// Number of the oldest of `frames`.
     oldest: u64,
@@ -98,19 +98,21 @@ impl Light {
     pub(super) fn of(
         display: OwnedDisplayHandle,
         windows: Vec<Arc<Window>>,
-    ) -> Result<Self, Untold> {
-        let foreign = Foreign::of(display, windows).ok_or(Untold::NotWayland)?;
-        let (globals, mut queue) =
-            registry_queue_init::<Told>(foreign.connection()).map_err(|_| Untold::NoProtocol)?;
+    ) -> Result<Self, NoFeedback> {
+        let foreign = Foreign::of(display, windows).ok_or(NoFeedback::NotWayland)?;
+        let (globals, mut queue) = registry_queue_init::<Feedback>(foreign.connection())
+            .map_err(|_| NoFeedback::NoProtocol)?;
         let presentation: WpPresentation = globals
             .bind(&queue.handle(), 1..=1, ())
-            .map_err(|_| Untold::NoProtocol)?;
-        let mut told = Told::default();
-        queue.roundtrip(&mut told).map_err(|_| Untold::NoProtocol)?; // its clock
-        told.clock.ok_or(Untold::NoClock)?;
+            .map_err(|_| NoFeedback::NoProtocol)?;
+        let mut feedback = Feedback::default();
+        queue
+            .roundtrip(&mut feedback)
+            .map_err(|_| NoFeedback::NoProtocol)?; // its clock
+        feedback.clock.ok_or(NoFeedback::NoClock)?;
         Ok(Self {
             queue,
-            told,
+            feedback,
             presentation,
             foreign,
         })
@@ -118,7 +120,7 @@ impl Light {
 
     /// Follows the frame that is handed over next, with pictures in these windows, by their places: call it right before.
     pub(super) fn follow(&mut self, frame: Option<u64>, places: impl Iterator<Item = usize>) {
-        let Some(number) = self.told.next_number() else {
+        let Some(number) = self.feedback.next_number() else {
             return;
         };
         let mut pictures = 0;
@@ -127,28 +129,28 @@ impl Light {
                 .feedback(surface, &self.queue.handle(), number);
             pictures += 1;
         }
-        self.told.follow(frame, pictures);
+        self.feedback.follow(frame, pictures);
     }
 
     /// The next frame that lit up, in order.
     pub(super) fn take(&mut self) -> Option<Lit> {
         // An error of the connection is winit's to tell.
-        let _ = self.queue.dispatch_pending(&mut self.told);
-        self.told.take()
+        let _ = self.queue.dispatch_pending(&mut self.feedback);
+        self.feedback.take()
     }
 
-    /// Frames without a light ([`Told::unlit`]) that were told of since this was asked last.
+    /// Frames without a light ([`Feedback::unlit`]) that were told of since this was asked last.
     pub(super) fn take_unlit(&mut self) -> u64 {
-        std::mem::take(&mut self.told.unlit)
+        std::mem::take(&mut self.feedback.unlit)
     }
 
     /// What the times are worth, for people.
     pub(super) fn described(&self) -> String {
-        let clock = match self.told.clock {
+        let clock = match self.feedback.clock {
             Some(clock) => format!("{clock:?}"),
             None => "unknown".to_owned(),
         };
-        let Some((kind, refresh)) = self.told.newest else {
+        let Some((kind, refresh)) = self.feedback.newest else {
             return format!("told by the compositor (clock {clock}); none came yet");
         };
         let rate = match refresh.as_secs_f64() {
@@ -178,7 +180,7 @@ fn worth(kind: Kind) -> String {
     }
 }
 
-impl Told {
+impl Feedback {
     /// Number of the frame that is followed next; `None` while as many as can be wait for their light.
     fn next_number(&self) -> Option<u64> {
         let waiting = self.frames.len();
@@ -274,9 +276,9 @@ fn clock_of(number: u32) -> Option<ClockId> {
     known.into_iter().find(|clock| *clock as u32 == number)
 }
 
-impl Dispatch<WpPresentation, ()> for Told {
+impl Dispatch<WpPresentation, ()> for Feedback {
     fn event(
-        told: &mut Self,
+        feedback: &mut Self,
         _: &WpPresentation,
         event: wp_presentation::Event,
         _: &(),
@@ -284,14 +286,14 @@ impl Dispatch<WpPresentation, ()> for Told {
         _: &QueueHandle<Self>,
     ) {
         if let wp_presentation::Event::ClockId { clk_id } = event {
-            told.clock = clock_of(clk_id);
+            feedback.clock = clock_of(clk_id);
         }
     }
 }
 
-impl Dispatch<WpPresentationFeedback, u64> for Told {
+impl Dispatch<WpPresentationFeedback, u64> for Feedback {
     fn event(
-        told: &mut Self,
+        feedback: &mut Self,
         _: &WpPresentationFeedback,
         event: wp_presentation_feedback::Event,
         number: &u64,
@@ -311,16 +313,16 @@ impl Dispatch<WpPresentationFeedback, u64> for Told {
                     WEnum::Value(kind) => kind,
                     WEnum::Unknown(_) => Kind::empty(),
                 };
-                told.newest = Some((kind, Duration::from_nanos(refresh.into())));
-                told.presented(*number, (tv_sec_hi, tv_sec_lo, tv_nsec));
+                feedback.newest = Some((kind, Duration::from_nanos(refresh.into())));
+                feedback.presented(*number, (tv_sec_hi, tv_sec_lo, tv_nsec));
             }
-            wp_presentation_feedback::Event::Discarded => told.note(*number, None),
+            wp_presentation_feedback::Event::Discarded => feedback.note(*number, None),
             _ => {}
         }
     }
 }
 
-impl Dispatch<WlRegistry, GlobalListContents> for Told {
+impl Dispatch<WlRegistry, GlobalListContents> for Feedback {
     fn event(
         _: &mut Self,
         _: &WlRegistry,
@@ -338,16 +340,16 @@ mod tests {
     use proptest::prelude::*;
 
     /// Follows frames 100, 101 .. with so many pictures each, by numbers from 7 on.
-    fn following(pictures: &[usize]) -> Told {
-        let mut told = Told {
+    fn following(pictures: &[usize]) -> Feedback {
+        let mut feedback = Feedback {
             clock: Some(ClockId::Monotonic),
             oldest: 7,
-            ..Told::default()
+            ..Feedback::default()
         };
         for (frame, pictures) in (100..).zip(pictures) {
-            told.follow(Some(frame), *pictures);
+            feedback.follow(Some(frame), *pictures);
         }
-        told
+        feedback
     }
 
     /// The clock that the compositor is said to have.
@@ -358,36 +360,36 @@ mod tests {
 
     #[test]
     fn a_frame_lit_up_when_its_last_picture_did_and_frames_come_in_order() {
-        let mut told = following(&[2, 1]);
+        let mut feedback = following(&[2, 1]);
         let now = Instant::now();
         let at = |ms| now.checked_add(Duration::from_millis(ms));
-        told.note(8, at(30));
-        assert_eq!(told.take(), None, "the one before is not told of");
-        told.note(7, at(16));
-        told.note(7, at(12));
-        let first = told.take().expect("both told");
+        feedback.note(8, at(30));
+        assert_eq!(feedback.take(), None, "the one before is not told of");
+        feedback.note(7, at(16));
+        feedback.note(7, at(12));
+        let first = feedback.take().expect("both told");
         assert_eq!((first.frame, Some(first.lit)), (Some(100), at(16)));
-        assert_eq!(told.take().and_then(|lit| lit.frame), Some(101));
-        assert_eq!((told.take(), told.unlit), (None, 0));
+        assert_eq!(feedback.take().and_then(|lit| lit.frame), Some(101));
+        assert_eq!((feedback.take(), feedback.unlit), (None, 0));
     }
 
     #[test]
     fn a_frame_of_which_a_picture_never_lit_up_is_counted_and_has_no_light() {
-        let mut told = following(&[2, 1]);
-        told.note(7, Some(Instant::now()));
-        told.note(7, None);
-        told.note(8, Some(Instant::now()));
-        told.note(99, None); // nobody asked
-        assert_eq!(told.take().and_then(|lit| lit.frame), Some(101));
-        assert_eq!(told.unlit, 1);
+        let mut feedback = following(&[2, 1]);
+        feedback.note(7, Some(Instant::now()));
+        feedback.note(7, None);
+        feedback.note(8, Some(Instant::now()));
+        feedback.note(99, None); // nobody asked
+        assert_eq!(feedback.take().and_then(|lit| lit.frame), Some(101));
+        assert_eq!(feedback.unlit, 1);
     }
 
     #[test]
     fn a_time_of_the_compositor_s_clock_is_one_of_this_program_s() {
         for clock in [ClockId::Monotonic, ClockId::MonotonicRaw] {
-            let told = Told {
+            let feedback = Feedback {
                 clock: Some(clock),
-                ..Told::default()
+                ..Feedback::default()
             };
             // However long this thread is kept waiting: between the moments around it, but for the rates of two clocks.
             let rates = Duration::from_millis(1);
@@ -400,9 +402,13 @@ mod tests {
                 } else {
                     reading - away
                 };
-                let told = told.instant(at).expect("a time");
+                let feedback = feedback.instant(at).expect("a time");
                 let after = Instant::now();
-                let now = if ahead { told - away } else { told + away };
+                let now = if ahead {
+                    feedback - away
+                } else {
+                    feedback + away
+                };
                 assert!(before <= now + rates && now <= after + rates, "{clock:?}");
             }
         }
@@ -421,19 +427,23 @@ mod tests {
             (0, 1, 1_000_000_000), // more than a second of nanoseconds
         ];
         for parts in impossible {
-            let mut told = following(&[1, 1]);
-            told.presented(7, parts);
+            let mut feedback = following(&[1, 1]);
+            feedback.presented(7, parts);
             let now = reading(ClockId::Monotonic);
-            told.presented(8, (0, now.as_secs() as u32, now.subsec_nanos()));
-            let next = told.take().and_then(|lit| lit.frame);
-            assert_eq!((next, told.unlit), (Some(101), 1), "{parts:?}");
+            feedback.presented(8, (0, now.as_secs() as u32, now.subsec_nanos()));
+            let next = feedback.take().and_then(|lit| lit.frame);
+            assert_eq!((next, feedback.unlit), (Some(101), 1), "{parts:?}");
         }
     }
 
     #[test]
     fn why_nobody_tells_is_said_by_name() {
-        assert!(Untold::NoProtocol.to_string().contains("wp_presentation"));
-        assert!(Untold::NotWayland.to_string().contains("not Wayland"));
+        assert!(
+            NoFeedback::NoProtocol
+                .to_string()
+                .contains("wp_presentation")
+        );
+        assert!(NoFeedback::NotWayland.to_string().contains("not Wayland"));
     }
 
     /// What a node or a compositor does.
@@ -464,22 +474,22 @@ mod tests {
         /// Whatever a compositor answers, in whatever order and how often.
         #[test]
         fn no_answer_of_a_compositor_breaks_the_count_of_frames(all in proptest::collection::vec(done(), 0..400)) {
-            let mut told = following(&[]);
-            told.oldest = 0;
+            let mut feedback = following(&[]);
+            feedback.oldest = 0;
             let (mut followed, mut taken) = (0_u64, Vec::new());
             for one in all {
                 match one {
-                    Done::Follow(pictures) if told.next_number().is_some() => {
-                        told.follow(Some(followed), pictures);
+                    Done::Follow(pictures) if feedback.next_number().is_some() => {
+                        feedback.follow(Some(followed), pictures);
                         followed += u64::from(pictures > 0);
                     }
                     Done::Follow(_) => {}
-                    Done::Presented(number, at) => told.presented(number, at),
-                    Done::Discarded(number) => told.note(number, None),
-                    Done::Take => taken.extend(told.take()),
+                    Done::Presented(number, at) => feedback.presented(number, at),
+                    Done::Discarded(number) => feedback.note(number, None),
+                    Done::Take => taken.extend(feedback.take()),
                 }
-                prop_assert!(told.frames.len() <= MAX_FOLLOWED);
-                prop_assert_eq!(taken.len() as u64 + told.unlit + told.frames.len() as u64, followed);
+                prop_assert!(feedback.frames.len() <= MAX_FOLLOWED);
+                prop_assert_eq!(taken.len() as u64 + feedback.unlit + feedback.frames.len() as u64, followed);
             }
             let now = Instant::now();
             for lit in &taken {

@@ -1,7 +1,7 @@
 //! Memory and latency of the rerun stream over a long session: `cargo run -p taut-monitor --example hours -- [MINUTES] [LIMIT_MIB]`, default 30 and 256.
 //!
-//! A stream as a session sends it, with its picture; its 43 series have 3.5 times the points, the numbers of 150 series. A second process reads all of it as a
-//! viewer does. Printed: memory of the first as it goes, its slope over the last third, and how old a message's newest sample was when the second had it.
+//! A session's stream with as much in it as there is room for: 43 plotted lines, the seven numbers of 15 poses and the three of the force's arrow are
+//! 151 series; four contacts are drawn beside them. A second process reads all of it as a viewer does. Printed: memory of the first as it goes, its slope over the last third, and how old a message's newest sample was when the second had it.
 
 use std::error::Error;
 use std::process::{Command, Stdio};
@@ -9,13 +9,12 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use taut_monitor::{
-    Monitor, MonitorOptions, MonitorSample, MonitorScene, ShownContact, observe_times,
+    BodyRole, MAX_MOVING_OBSTACLES, Monitor, MonitorBody, MonitorOptions, MonitorSample,
+    MonitorScene, ShownContact, observe_times,
 };
 
 /// As a session's: 50 a second.
 const SAMPLE_PERIOD: Duration = Duration::from_millis(20);
-/// Session time passes so much faster than time, and points come so much closer: 43 series are as many numbers as 150.
-const PACE: f64 = 3.5;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -32,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Session time, the same in both processes.
 fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| (since.as_nanos() as f64 * PACE) as u64)
+    since.map_or(0, |since| since.as_nanos() as u64)
 }
 
 fn session(minutes: f64, limit_mib: u64) -> Result<(), Box<dyn Error>> {
@@ -43,7 +42,7 @@ fn session(minutes: f64, limit_mib: u64) -> Result<(), Box<dyn Error>> {
         memory_limit_bytes: limit_mib << 20,
         ..MonitorOptions::default()
     };
-    let (monitor, mut sender) = Monitor::start(&options, MonitorScene::new("hours"))?;
+    let (monitor, mut sender) = Monitor::start(&options, scene())?;
     let mut observer = Command::new(std::env::current_exe()?)
         .args(["--observe", &duration.as_secs().to_string()])
         .args(monitor.stream_address())
@@ -53,15 +52,15 @@ fn session(minutes: f64, limit_mib: u64) -> Result<(), Box<dyn Error>> {
     println!("a history of {limit_mib} MiB, {minutes} minutes");
     let start = Instant::now();
     let mut memory: Vec<(f64, f64)> = Vec::new(); // s, MiB
-    let mut told = Duration::ZERO;
+    let mut next_line = Duration::ZERO;
     let mut next = start;
     while start.elapsed() < duration {
         next = (next + SAMPLE_PERIOD).max(Instant::now());
         std::thread::sleep(next.saturating_duration_since(Instant::now()));
         sender.offer(sample(start.elapsed().as_secs_f64()));
-        if start.elapsed() >= told {
+        if start.elapsed() >= next_line {
             memory.push((start.elapsed().as_secs_f64(), resident_mib()?));
-            told += duration / 60;
+            next_line += duration / 60;
             if let [.., (seconds, mib)] = *memory
                 && memory.len() % 4 == 1
             {
@@ -81,7 +80,25 @@ fn session(minutes: f64, limit_mib: u64) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A hand that moves, four contacts, a force of every tick.
+/// A god-object and all the moving obstacles whose places a sample carries.
+fn scene() -> MonitorScene {
+    let body = |name: String, role| MonitorBody {
+        name,
+        vertices: vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
+        normals: None,
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        colour: None,
+        role,
+        pose: Isometry3::identity(),
+    };
+    let obstacle = |k| body(format!("obstacle {k}"), BodyRole::MovingObstacle);
+    let mut scene = MonitorScene::new("hours");
+    scene.bodies = vec![body("god-object".into(), BodyRole::GodObject)];
+    scene.bodies.extend((0..MAX_MOVING_OBSTACLES).map(obstacle));
+    scene
+}
+
+/// A hand that moves, obstacles that move, four contacts, a force of every tick.
 fn sample(t: f64) -> MonitorSample {
     let mut sample = MonitorSample::at(now_ns());
     sample.god_object_pose = Isometry3::translation(t.sin(), t.cos(), 0.2);
@@ -93,6 +110,12 @@ fn sample(t: f64) -> MonitorSample {
         sample
             .between
             .add(&sample.wrench, (900.0 + 100.0 * t.sin()) as f32);
+    }
+    for k in 0..MAX_MOVING_OBSTACLES as u16 {
+        let turn = Vector3::z() * (t + f64::from(k));
+        sample
+            .moving
+            .push(k, Isometry3::new(Vector3::x() * f64::from(k), turn));
     }
     sample.gap_min = 1e-4 * t.sin().abs();
     for k in 0..4 {
@@ -130,7 +153,7 @@ fn observe(seconds: u64, stream: &str) -> Result<(), Box<dyn Error>> {
     let mut ages = Vec::new(); // ms, of the messages that bring something newer: the past comes later
     observe_times(stream, Duration::from_secs(seconds), |newest| {
         if newest > joined {
-            let age_ns = now_ns().saturating_sub(newest) as f64 / PACE;
+            let age_ns = now_ns().saturating_sub(newest) as f64;
             ages.push((age_ns * 1e-6) as f32);
         }
     })?;

@@ -41,7 +41,7 @@ const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(20);
 /// The running server, as rerun feeds it. Dropped, it closes both ports.
 pub(crate) struct Hosted {
     history: Arc<History>,
-    /// Told when the history has grown; gone, it is the end.
+    /// Chunks when the history has grown; gone, it is the end.
     grown: watch::Sender<()>,
 }
 
@@ -172,24 +172,24 @@ struct Proxy {
     growth: watch::Receiver<()>,
 }
 
-type Told<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+type Chunks<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 #[tonic::async_trait]
 impl MessageProxyService for Proxy {
-    type ReadMessagesStream = Told<ReadMessagesResponse>;
-    type ReadTablesStream = Told<ReadTablesResponse>;
+    type ReadMessagesStream = Chunks<ReadMessagesResponse>;
+    type ReadTablesStream = Chunks<ReadTablesResponse>;
 
     async fn read_messages(
         &self,
         _: Request<ReadMessagesRequest>,
     ) -> Result<Response<Self::ReadMessagesStream>, Status> {
         let messages = self.history.observe(self.growth.clone());
-        let told = messages.map(|message| {
+        let chunks = messages.map(|message| {
             Ok(ReadMessagesResponse {
                 log_msg: Some(message),
             })
         });
-        Ok(Response::new(Box::pin(told)))
+        Ok(Response::new(Box::pin(chunks)))
     }
 
     async fn read_tables(

@@ -81,13 +81,13 @@ pub fn observe(stream_address: &str, duration: Duration) -> Result<RrdSummary, I
 pub fn observe_times(
     stream_address: &str,
     duration: Duration,
-    mut told: impl FnMut(u64),
+    mut on_newest: impl FnMut(u64),
 ) -> Result<(), InspectError> {
     follow(stream_address, duration, |message| {
         let mut contents = Contents::default();
         contents.add(message)?;
         if let Some((_, newest)) = contents.time_ns {
-            told(newest.unsigned_abs());
+            on_newest(newest.unsigned_abs());
         }
         Ok(())
     })

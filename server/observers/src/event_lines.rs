@@ -125,35 +125,35 @@ mod tests {
     #[test]
     fn each_event_is_a_line_and_a_gap_is_said() {
         let mut trail = EventLines::new(|_| None);
-        let told = lines(&mut trail, 4..6, 1);
-        let ids: Vec<_> = told.iter().map(|line| line["id"].clone()).collect();
+        let shown = lines(&mut trail, 4..6, 1);
+        let ids: Vec<_> = shown.iter().map(|line| line["id"].clone()).collect();
         assert_eq!(ids, [json!(4), json!(5)]);
-        assert_eq!(told[0]["kind"], json!("contact-on"));
-        assert_eq!(told[0]["tick"], json!((7_u64 << 32) + 90));
+        assert_eq!(shown[0]["kind"], json!("contact-on"));
+        assert_eq!(shown[0]["tick"], json!((7_u64 << 32) + 90));
         assert!(lines(&mut trail, 0..0, 1).is_empty());
-        let told = lines(&mut trail, 8..10, 1);
-        assert_eq!(told[0], json!({"type": "missed", "events": 2}));
-        assert_eq!(told.len(), 3);
+        let shown = lines(&mut trail, 8..10, 1);
+        assert_eq!(shown[0], json!({"type": "missed", "events": 2}));
+        assert_eq!(shown.len(), 3);
     }
 
     #[test]
     fn buttons_and_the_device_port_say_what_of() {
         let mut trail = EventLines::new(|kind| (kind == 10).then_some("the force was limited"));
         let button = event_code::BUTTON_DOWN | 2 << event_code::VALUE_SHIFT;
-        let told = lines(&mut trail, 2..3, button);
+        let shown = lines(&mut trail, 2..3, button);
         assert_eq!(
-            (&told[0]["kind"], &told[0]["button"]),
+            (&shown[0]["kind"], &shown[0]["button"]),
             (&json!("button-down"), &json!(2))
         );
-        let told = lines(&mut trail, 3..4, event_code::safety(10, 23.5));
-        assert_eq!(told[0]["kind"], json!("device-port"));
+        let shown = lines(&mut trail, 3..4, event_code::safety(10, 23.5));
+        assert_eq!(shown[0]["kind"], json!("device-port"));
         assert_eq!(
-            (&told[0]["text"], &told[0]["value"]),
+            (&shown[0]["text"], &shown[0]["value"]),
             (&json!("the force was limited"), &json!(23.5))
         );
-        let told = lines(&mut trail, 4..5, 0x77);
+        let shown = lines(&mut trail, 4..5, 0x77);
         assert_eq!(
-            (&told[0]["kind"], &told[0]["code"]),
+            (&shown[0]["kind"], &shown[0]["code"]),
             (&json!("unknown"), &json!(0x77))
         );
     }

@@ -225,7 +225,7 @@ async fn serve(
         // It may take long, and who has shown the token is not crowded out by others; the desk bounds their number.
         Heard::Edited(outcome) => {
             drop(asking);
-            let (status, text) = told(come_of(outcome, EDIT_PATIENCE).await, NOT_YET_TAKEN);
+            let (status, text) = answer_to(come_of(outcome, EDIT_PATIENCE).await, NOT_YET_TAKEN);
             return answer(&mut stream, status, TEXT, &format!("{text}\n")).await;
         }
         heard => heard,
@@ -287,7 +287,7 @@ async fn answer_once(stream: &mut TcpStream, heard: Heard, shared: &Shared) -> R
         Heard::Look(Call::Token) => ("200 OK", "the token is right"),
         Heard::Look(_) => return answer(stream, "200 OK", HTML, PAGE).await,
         Heard::Done(outcome) | Heard::Edited(outcome) => {
-            let (status, text) = told(come_of(outcome, PATIENCE).await, NO_ANSWER);
+            let (status, text) = answer_to(come_of(outcome, PATIENCE).await, NO_ANSWER);
             return answer(stream, status, TEXT, &format!("{text}\n")).await;
         }
         Heard::NotDone(why) => {
@@ -299,7 +299,10 @@ async fn answer_once(stream: &mut TcpStream, heard: Heard, shared: &Shared) -> R
 }
 
 /// Status and text of what came of a deed; `silent` where nothing did in time.
-fn told(answer: Option<Answer>, silent: (&'static str, &'static str)) -> (&'static str, String) {
+fn answer_to(
+    answer: Option<Answer>,
+    silent: (&'static str, &'static str),
+) -> (&'static str, String) {
     match answer {
         Some(Ok(text)) => ("200 OK", text),
         Some(Err(text)) => (NOT_DONE, text),

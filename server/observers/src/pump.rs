@@ -22,17 +22,17 @@ impl StateFeed {
     ) {
         let mut ticks = interval(Duration::from_secs_f64(rate.recip()));
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        let mut told = Instant::now();
+        let mut last_sent = Instant::now();
         loop {
             ticks.tick().await;
             if let Some(fresh) = self.fresh() {
                 to.send_replace(Some(Arc::new(each(fresh))));
-            } else if told.elapsed() >= REPEAT_PERIOD {
+            } else if last_sent.elapsed() >= REPEAT_PERIOD {
                 to.send_modify(|_| {});
             } else {
                 continue;
             }
-            told = Instant::now();
+            last_sent = Instant::now();
         }
     }
 }

@@ -252,7 +252,7 @@ async fn settle(stream: &mut TcpStream, shared: &Shared, asking: Asking) -> Resu
     let (mut asking, status) = (asking, "503 Service Unavailable");
     tokio::select! {
         biased;
-        told = answer(stream, status, TEXT, "all places of observers are taken: see [observers] max_observers\n") => told?,
+        answered = answer(stream, status, TEXT, "all places of observers are taken: see [observers] max_observers\n") => answered?,
         _ = &mut asking.lost => {}
     }
     Err(End::Gone)

@@ -132,14 +132,14 @@ fn every_record_is_there_bit_by_bit_at_its_session_time() {
 fn buttons_are_told_when_they_change() {
     let (directory, scene) = (recorded(), scene());
     let presses = export(directory.path(), Ok(&scene)).read::<Joy>("/device/buttons");
-    let told: Vec<_> = presses
+    let seen: Vec<_> = presses
         .iter()
         .map(|(time, Joy(header, axes, buttons))| {
             assert_eq!(header.frame, "device");
             (*time, axes.len(), buttons.len(), buttons[0])
         })
         .collect();
-    assert_eq!(told, [(1_000_000, 0, 16, 0), (4_000_000, 0, 16, 1)]);
+    assert_eq!(seen, [(1_000_000, 0, 16, 0), (4_000_000, 0, 16, 1)]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
-use taut_bridge::service_manager::{Teller, Turns};
+use taut_bridge::service_manager::{ServiceNotifier, Turns};
 use taut_link::{ClientLink, ClientOptions, LinkError, Renewal, Role, SessionEnd, SupervisedLink};
 use taut_proto::ForceSample;
 
@@ -35,7 +35,7 @@ pub async fn run(args: &PushWrenchArgs) -> Result<u64, Failure> {
         ..ClientOptions::new(&args.server, key, Role::Force, &args.node)
     };
     let alive = Turns::default();
-    let teller = Teller::start("the force source runs", [alive.clone()], || false);
+    let notifier = ServiceNotifier::start("the force source runs", [alive.clone()], || false);
     let joining = SupervisedLink::join(options, args.membership.policy(), |_| {
         ready(Ok::<(), LinkError>(()))
     });
@@ -52,7 +52,7 @@ pub async fn run(args: &PushWrenchArgs) -> Result<u64, Failure> {
         &alive,
     )
     .await;
-    drop(teller);
+    drop(notifier);
     // Nobody is to join again for the session that is left here.
     drop(supervised);
     link.leave().await;

@@ -7,7 +7,7 @@ use std::io::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use taut_bridge::service_manager::{Teller, Turns};
+use taut_bridge::service_manager::{ServiceNotifier, Turns};
 use taut_link::{
     ClientLink, ClientOptions, LinkError, LinkHealth, ReceivedState, RejoinPolicy, Renewal, Role,
     SupervisedLink,
@@ -53,7 +53,7 @@ pub(super) async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         ..args.membership.policy()
     };
     let alive = Turns::default();
-    let teller = Teller::start("the recorder runs", [alive.clone()], || false);
+    let notifier = ServiceNotifier::start("the recorder runs", [alive.clone()], || false);
     let joining = SupervisedLink::join(options, policy, |_| ready(Ok::<(), LinkError>(())));
     let joined = tokio::select! {
         joined = alive.during(joining) => joined?,
@@ -73,7 +73,7 @@ pub(super) async fn run(args: &RecordArgs) -> Result<u64, Failure> {
     let recorded = recorder
         .take_states(&supervised, args.duration, &mut signal, &alive)
         .await;
-    drop(teller);
+    drop(notifier);
     // Nobody is to join again for the session that is left here.
     drop(supervised);
     let lost = recorder.lost + recorder.link.counters().lost;

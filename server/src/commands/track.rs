@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use god_object::spatial::Pose;
-use taut_bridge::service_manager::{Teller, Turns};
+use taut_bridge::service_manager::{ServiceNotifier, Turns};
 use taut_bridge::{Trace, TrackerFeed, VrpnSettings, read_trace};
 use taut_link::{ClientLink, ClientOptions, LinkError, Renewal, Role, SessionEnd, SupervisedLink};
 use taut_proto::{HeadSample, PoseF64};
@@ -43,7 +43,7 @@ pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
         ..ClientOptions::new(&args.server, key, Role::Tracker, &args.node)
     };
     let alive = Turns::default();
-    let teller = Teller::start("the tracker runs", [alive.clone()], || false);
+    let notifier = ServiceNotifier::start("the tracker runs", [alive.clone()], || false);
     let joining = SupervisedLink::join(options, args.membership.policy(), |_| {
         ready(Ok::<(), LinkError>(()))
     });
@@ -61,7 +61,7 @@ pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
         &alive,
     );
     let (sent, end) = sending.await;
-    drop(teller);
+    drop(notifier);
     // Nobody is to join again for the session that is left here.
     drop(supervised);
     link.leave().await;

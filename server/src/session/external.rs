@@ -95,7 +95,7 @@ fn subscribe(
 pub(super) struct ExternalTrail {
     felt: bool,
     refused: u64,
-    told: Option<Duration>,
+    summed_at: Option<Duration>,
 }
 
 impl ExternalTrail {
@@ -113,14 +113,16 @@ impl ExternalTrail {
         }
         let counts = statistics.refused();
         let refused = counts.iter().map(|(_, count)| count).sum();
-        let is_due = self.told.is_none_or(|told| now >= told + SUM_PERIOD);
+        let is_due = self
+            .summed_at
+            .is_none_or(|summed_at| now >= summed_at + SUM_PERIOD);
         if refused > self.refused && is_due {
             let reasons = counts.iter().filter(|(_, count)| *count > 0);
             let reasons: Vec<String> = reasons
                 .map(|(why, count)| format!("{why} {count}"))
                 .collect();
             lines.push(format!("refused in all: {}", reasons.join(", ")));
-            (self.refused, self.told) = (refused, Some(now));
+            (self.refused, self.summed_at) = (refused, Some(now));
         }
         lines
     }

@@ -13,7 +13,7 @@ pub(super) struct Refusals<K> {
     sources: Vec<Source<K>>,
     /// Beyond [`MAX_SOURCES`].
     others: u64,
-    others_told: Duration,
+    others_summed_at: Duration,
 }
 
 #[derive(Debug)]
@@ -28,7 +28,7 @@ impl<K> Default for Refusals<K> {
         Self {
             sources: Vec::new(),
             others: 0,
-            others_told: Duration::ZERO,
+            others_summed_at: Duration::ZERO,
         }
     }
 }
@@ -66,9 +66,9 @@ impl<K: Copy + PartialEq> Refusals<K> {
             source.since = now;
             true
         });
-        if self.others > 0 && now >= self.others_told + SUM_PERIOD {
+        if self.others > 0 && now >= self.others_summed_at + SUM_PERIOD {
             sums.push((None, std::mem::take(&mut self.others)));
-            self.others_told = now;
+            self.others_summed_at = now;
         }
         sums
     }

@@ -241,13 +241,13 @@ impl Work {
 
 /// The session with a router; `None` where the end came before one was reached.
 pub(crate) fn open(config: &Config, stop: &AtomicBool) -> Option<Session> {
-    let mut told = false;
+    let mut warned = false;
     while !stop.load(Ordering::Relaxed) {
         match zenoh::open(config.clone()).wait() {
             Ok(session) => return Some(session),
-            Err(error) if !told => {
+            Err(error) if !warned => {
                 tracing::warn!("[zenoh] reaches no router and goes on trying: {error}");
-                told = true;
+                warned = true;
             }
             Err(_) => {}
         }

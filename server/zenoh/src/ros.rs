@@ -127,7 +127,7 @@ pub(crate) struct RosTopics<'s> {
     god_object_twist: Topic<'s>,
     hand_wrench: Topic<'s>,
     transforms: Topic<'s>,
-    told: Option<(u16, Duration)>,
+    sent: Option<(u16, Duration)>,
     bytes: Vec<u8>,
     _node: LivelinessToken,
 }
@@ -163,7 +163,7 @@ impl<'s> RosTopics<'s> {
             )?,
             hand_wrench: Topic::new::<WrenchStamped<'_>>(session, n, 5, &own("hand/wrench"))?,
             transforms: Topic::new::<TfMessage<'_>>(session, n, 6, "/tf")?,
-            told: None,
+            sent: None,
             bytes: Vec::new(),
             _node: session.liveliness().declare_token(node.token()).wait()?,
         })
@@ -195,11 +195,11 @@ impl<'s> RosTopics<'s> {
             .put(&TwistStamped::new(at, &twist), bytes)?;
         self.hand_wrench
             .put(&WrenchStamped::new(at, &wrench), bytes)?;
-        let is_told = self.told.is_some_and(|(buttons, when)| {
+        let is_sent = self.sent.is_some_and(|(buttons, when)| {
             buttons == tool.buttons && sampled < when + BUTTONS_PERIOD
         });
-        if !is_told {
-            self.told = Some((tool.buttons, sampled));
+        if !is_sent {
+            self.sent = Some((tool.buttons, sampled));
             let joy = Joy::new(world.in_frame(DEVICE), tool.buttons);
             self.device_buttons.put(&joy, bytes)?;
         }

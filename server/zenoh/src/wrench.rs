@@ -81,11 +81,11 @@ impl RosWrenchSubscriber {
         }
         let key = key::<WrenchStamped<'_>>(settings.domain, &settings.topic);
         let stop = Arc::<AtomicBool>::default();
-        let (told, wanted) = (stop.clone(), key.clone());
+        let (stopping, wanted) = (stop.clone(), key.clone());
         let thread = std::thread::Builder::new()
             .name("zenoh-wrench".to_owned())
             .spawn(move || {
-                let Some(session) = open(&config, &told) else {
+                let Some(session) = open(&config, &stopping) else {
                     return;
                 };
                 let node = node(&session, settings.domain, format!("/{}", settings.name));
@@ -102,7 +102,7 @@ impl RosWrenchSubscriber {
                 if let Err(error) = &subscribed {
                     tracing::error!("the topic of [wrench_in] cannot be subscribed to: {error}");
                 }
-                while !told.load(Ordering::Relaxed) {
+                while !stopping.load(Ordering::Relaxed) {
                     std::thread::sleep(LOOK_PERIOD);
                 }
                 drop(subscribed);

@@ -114,7 +114,7 @@ pub struct Outcome {
     /// True age of that data at the end.
     pub age_at_end: Duration,
     /// What the bridge's port told.
-    pub told: Vec<EventKind>,
+    pub events: Vec<EventKind>,
 }
 
 /// A ball that a light hand taps and rubs against the scene of `task`, again and again: centre of the motion and its reach there and back.
@@ -229,14 +229,14 @@ pub fn run_with(
         largest: [0.0; 2],
         oldest: Duration::ZERO,
         age_at_end: Duration::ZERO,
-        told: Vec::new(),
+        events: Vec::new(),
     };
     let ticks = (duration.as_secs_f64() / TICK.as_secs_f64()) as u32;
     for tick in 1..=ticks {
         let now = TICK * tick;
         up.set_delay(near.delay_ns + growth.delay_ns(now, 0));
         down.set_delay(near.delay_ns + growth.delay_ns(now, 1));
-        let felt = bridge.tick(tick, now, &mut down, &mut up, &mut outcome.told);
+        let felt = bridge.tick(tick, now, &mut down, &mut up, &mut outcome.events);
         outcome.age_at_end = bridge.newest_data.map_or(now, |taken| now - taken);
         if felt > 0.0 {
             let after = usize::from(now >= growth.begin);
@@ -389,7 +389,7 @@ impl Bridge {
         now: Duration,
         down: &mut Way,
         up: &mut Way,
-        told: &mut Vec<EventKind>,
+        events: &mut Vec<EventKind>,
     ) -> f64 {
         let (now_ns, here) = (now.as_nanos() as u64, now + CLOCK_OFFSET);
         let here_ns = here.as_nanos() as u64;
@@ -419,7 +419,7 @@ impl Bridge {
             self.of.take_set(&self.set, here, session);
         }
         let output = self.of.tick(here, session, self.command);
-        told.extend(output.events.iter().map(|event| event.kind));
+        events.extend(output.events.iter().map(|event| event.kind));
         let InputSample { sample_time_ns, .. } = output.input;
         self.stamps.push_back((sample_time_ns, now));
         up.send(now_ns, &Payload::Input(output.input));

@@ -88,7 +88,7 @@ pub struct Stroke {
     port: DevicePort,
     now: Duration,
     /// What was told, with its time since the begin.
-    pub told: Vec<(EventKind, Duration)>,
+    pub events: Vec<(EventKind, Duration)>,
     /// Norm of the force at each tick, N.
     pub forces: Vec<f64>,
     /// Largest change of the force in one tick, N.
@@ -123,7 +123,7 @@ impl Stroke {
         Self {
             port: DevicePort::new(Box::new(device), settings, Point3::origin(), &start),
             now: Self::BEGIN,
-            told: Vec::new(),
+            events: Vec::new(),
             forces: Vec::new(),
             largest_step: 0.0,
             last: Vector3::zeros(),
@@ -149,7 +149,7 @@ impl Stroke {
             Some(Command::fresh(now, Vector6::z() * (STIFFNESS * depth)))
         });
         let since = self.passed();
-        self.told
+        self.events
             .extend(report.events.iter().map(|event| (event.kind, since)));
         let force: Vector3<f64> = report.wrench.fixed_rows::<3>(0).into();
         self.largest_step = self.largest_step.max((force - self.last).norm());
@@ -168,7 +168,7 @@ impl Stroke {
 
     /// Whether something was told.
     #[must_use]
-    pub fn was_told(&self, kind: EventKind) -> bool {
-        self.told.iter().any(|(told, _)| *told == kind)
+    pub fn has_event(&self, kind: EventKind) -> bool {
+        self.events.iter().any(|(event, _)| *event == kind)
     }
 }

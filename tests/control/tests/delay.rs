@@ -29,7 +29,7 @@ fn keeps_its_promise(name: &str, rubbing: &Rubbing, mode: Mode) {
         usual.given * 1e3
     );
     assert!(usual.largest[1] > 1.0, "{usual:?}");
-    assert!(!usual.told.contains(&EventKind::ForceStale), "{usual:?}");
+    assert!(!usual.events.contains(&EventKind::ForceStale), "{usual:?}");
     for (ways, growth) in [
         ("both", growing(true, true)),
         ("up", growing(true, false)),
@@ -48,7 +48,7 @@ fn keeps_its_promise(name: &str, rubbing: &Rubbing, mode: Mode) {
         assert!(attacked.given <= usual.given + MORE, "{ways}: {attacked:?}");
         assert!(attacked.oldest < ZERO_AFTER, "{ways}: {attacked:?}");
         assert!(
-            attacked.told.contains(&EventKind::ForceStale),
+            attacked.events.contains(&EventKind::ForceStale),
             "{attacked:?}"
         );
     }

@@ -35,9 +35,9 @@ fn start() -> (Service, String) {
         .output()
         .expect("cargo runs");
     assert!(built.status.success(), "the program is not built");
-    let told = String::from_utf8(built.stdout).expect("text");
+    let messages = String::from_utf8(built.stdout).expect("text");
     let key = "\"executable\":\"";
-    let program = told.lines().rev().find_map(|line| {
+    let program = messages.lines().rev().find_map(|line| {
         let from = line.find(key)? + key.len();
         line[from..].split('"').next()
     });

@@ -45,7 +45,7 @@ pub fn html(results: &Results) -> Result<String, Box<dyn Error>> {
         overview_section(&mut page, results)?;
         summary(&mut page, results)?;
         glance::matrices(&mut page, results)?;
-        glance::foretold(&mut page, results)?;
+        glance::predicted(&mut page, results)?;
         traces::section(&mut page, &results.traces)?;
         not_kept(&mut page, results)?;
         glance::out_of_scope(&mut page, results)?;

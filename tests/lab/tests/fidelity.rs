@@ -59,9 +59,9 @@ fn a_choice_is_within_the_budget_and_not_far_from_the_cheapest_that_is() {
     assert!(choices(&swept).lines().count() > swept.len());
 }
 
-/// The held-out scenes are of use only against what was foretold before they were run.
+/// The held-out scenes are of use only against what was predicted before they were run.
 #[test]
-fn what_was_foretold_of_the_held_out_scenes_still_is() {
+fn what_was_predicted_of_the_held_out_scenes_still_is() {
     let files = tempfile::tempdir().expect("a temporary directory");
     let scenes = held_out::all(files.path()).expect("files can be written");
     assert_eq!(scenes.len(), 12);

@@ -142,7 +142,7 @@ fn a_trace_shows_the_fall_through_the_plate() {
     );
     assert!(discrete.abs() < 0.1 * right, "{discrete} N: it is through");
     let page = text(&folder.path().join("report.html"));
-    for section in ["matrix", "foretold", "traces", "scope", "reading"] {
+    for section in ["matrix", "predicted", "traces", "scope", "reading"] {
         assert!(page.contains(&format!("id={section}>")), "{section}");
     }
     // Every method of the plan in a line of the picture, and the right answer.

@@ -14,13 +14,13 @@ use taut_network_tests::bench::screen::{Screen, Swapped, longest_gap_ms};
 use taut_network_tests::bench::wait_until;
 use taut_proto::barrier::FRAMES_LEFT_OUT;
 
-/// Silence after which nodes and server give each other up; a node leads after three tenths of it, so that there are seven seconds for its reign and
+/// Silence after which nodes and server give each other up; a node leads after three tenths of it, so that there are seven seconds for its term and
 /// the return, on a busy machine, too.
 const SILENCE: Duration = Duration::from_secs(10);
 /// Longest time without a frame: three seconds of silence, three turns of a second, and a machine that has other things to do.
 const LONGEST_GAP_MS: f64 = 9_000.0;
 /// Frames that each leader leads at least.
-const REIGN: u64 = 30;
+const FRAMES_OF_A_TERM: u64 = 30;
 const NODES: u64 = 3;
 
 type Failure = Box<dyn std::error::Error>;
@@ -44,21 +44,21 @@ fn a_server_that_stood_still_takes_the_frames_back_from_the_node_that_led() -> R
         screens.push(Screen::start(&runtime, options, number)?);
     }
     let all_above = |frame: u64| screens.iter().all(|screen| screen.frame() > frame);
-    wait_until("frames of the server", || all_above(2 * REIGN))?;
+    wait_until("frames of the server", || all_above(2 * FRAMES_OF_A_TERM))?;
 
     server.signal(Signal::STOP)?;
     let stopped = Instant::now();
     let before = screens.iter().map(Screen::frame).max().unwrap_or(0);
     let of_node = before + FRAMES_LEFT_OUT / 2;
     wait_until("frames of a node", || {
-        all_above(before + FRAMES_LEFT_OUT + REIGN)
+        all_above(before + FRAMES_LEFT_OUT + FRAMES_OF_A_TERM)
     })?;
     server.signal(Signal::CONT)?;
     let of_server = before + FRAMES_LEFT_OUT * 3 / 2;
     // The node goes on leading until the server has been heard: its numbers are counted from there, and the server is given as many again.
     let led = screens.iter().map(Screen::frame).max().unwrap_or(0);
     wait_until("frames of the server again", || {
-        all_above(led + FRAMES_LEFT_OUT + 3 * REIGN)
+        all_above(led + FRAMES_LEFT_OUT + 3 * FRAMES_OF_A_TERM)
     })?;
     let end = Instant::now();
 
@@ -89,15 +89,15 @@ fn a_server_that_stood_still_takes_the_frames_back_from_the_node_that_led() -> R
         let hashes: HashSet<_> = swaps.iter().map(|swap| swap.state_hash).collect();
         assert_eq!(hashes.len(), 1, "frame {frame} is one picture: {swaps:?}");
         if *frame > of_node {
-            let reign = usize::from(*frame > of_server);
-            states[reign].extend(hashes);
-            whole[reign] += u64::from(swaps.len() as u64 == NODES);
+            let term = usize::from(*frame > of_server);
+            states[term].extend(hashes);
+            whole[term] += u64::from(swaps.len() as u64 == NODES);
         }
     }
     // The node leads with the state that was held; the server with its own, each frame a new one.
     assert_eq!(states[0].len(), 1);
     assert!(
-        states[1].len() as u64 >= REIGN,
+        states[1].len() as u64 >= FRAMES_OF_A_TERM,
         "{} states",
         states[1].len()
     );

@@ -1,13 +1,12 @@
 //! How a client gets in: name to address, QUIC, Hello, Welcome, scene.
 
 use super::{
-    ClientLink, ClientOptions,
+    ClientLink, ClientOptions, control,
     group::GroupEnd,
     hot::{Hot, Path},
     inbound::Inbound,
     link::AtJoin,
     meshes::Meshes,
-    told,
 };
 use crate::{
     DEFAULT_QUIC_PORT, LinkError, binding,
@@ -111,7 +110,7 @@ pub(crate) async fn connect_with(
         welcome.version,
     ));
     hot.clone().start()?;
-    tokio::spawn(told::listen(hot.clone(), recv, options.rate_hz == 0));
+    tokio::spawn(control::listen(hot.clone(), recv, options.rate_hz == 0));
     meshes.keep_only(&description);
     Ok(ClientLink::new(
         options.server,

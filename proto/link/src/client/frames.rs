@@ -1,6 +1,6 @@
-//! Shared datum: the barrier as this node sees it, with the state of the newest RELEASE, and the reign of this node while it leads.
+//! Shared datum: the barrier as this node sees it, with the state of the newest RELEASE, and the term of this node while it leads.
 //!
-//! Writers: the receiver of datagrams, the thread that draws, and the thread that leads while this node does ([`super::reign`]); one lock among
+//! Writers: the receiver of datagrams, the thread that draws, and the thread that leads while this node does ([`super::leadership`]); one lock among
 //! them, never held across a system call but for waiting on it.
 
 use std::{
@@ -24,7 +24,7 @@ const LATE_LOOK_NS: u64 = 100_000_000;
 pub(crate) struct Frames {
     inner: Mutex<Option<Part>>,
     released: Condvar,
-    /// For the thread that leads: somebody arrived, or the reign is over.
+    /// For the thread that leads: somebody arrived, or the term is over.
     led: Condvar,
 }
 
@@ -36,7 +36,7 @@ pub(crate) struct Part {
     pub(crate) state: Option<(HotState, u64)>,
     succession: Succession,
     looked_ns: u64,
-    reign: Option<Master>,
+    leading: Option<Master>,
     witnessed: Witnessed,
 }
 
@@ -53,7 +53,7 @@ pub(crate) enum ToMember {
     Nothing,
     /// It may not say that, now or at all.
     Refused,
-    /// It does not know the newest RELEASE of this node's reign.
+    /// It does not know the newest RELEASE of this node's term.
     Newest,
 }
 
@@ -80,7 +80,7 @@ impl Part {
             state: None,
             succession: Succession::new(session, now_ns).after_silence(silence_ns),
             looked_ns: now_ns,
-            reign: None,
+            leading: None,
             witnessed: Witnessed {
                 hashes: Box::new([0; REMEMBERED_STATES]),
                 next: 0,
@@ -88,9 +88,9 @@ impl Part {
         }
     }
 
-    /// The newest RELEASE of this node's own reign, as it is sent.
+    /// The newest RELEASE of this node's own term, as it is sent.
     fn own_release(&self) -> Option<Release> {
-        let head = self.reign.as_ref()?.newest()?.clone();
+        let head = self.leading.as_ref()?.newest()?.clone();
         let (state, _) = self.state.as_ref()?;
         Some(Release {
             head,
@@ -98,11 +98,11 @@ impl Part {
         })
     }
 
-    /// Ends this node's reign if there is a better one; whether it ended now.
+    /// Ends this node's term if there is a better one; whether it ended now.
     fn resign(&mut self, now_ns: u64) -> bool {
-        let over = self.reign.is_some() && self.succession.poll(now_ns) == Successor::Resign;
+        let over = self.leading.is_some() && self.succession.poll(now_ns) == Successor::Resign;
         if over {
-            self.reign = None;
+            self.leading = None;
         }
         over
     }
@@ -200,9 +200,9 @@ impl Frames {
         }
         part.succession.release(local_ns, head);
         let over = part.resign(local_ns);
-        let own = part.reign.as_ref().and_then(Master::newest);
+        let own = part.leading.as_ref().and_then(Master::newest);
         if own.is_some_and(|own| own.rank() > head.rank()) {
-            return ToMember::Newest; // it leads as well, and is to learn of this reign
+            return ToMember::Newest; // it leads as well, and is to learn of this term
         }
         if part.node.release(local_ns, head) {
             if part.witnessed.has(state_hash) {
@@ -220,7 +220,7 @@ impl Frames {
     /// Takes an ARRIVE in, from a member or from this node itself, where this node leads. No allocation.
     pub(crate) fn arrive(&self, sender: u16, arrive: &Arrive, local_ns: u64) -> ToMember {
         let mut inner = self.lock();
-        let Some(master) = inner.as_mut().and_then(|part| part.reign.as_mut()) else {
+        let Some(master) = inner.as_mut().and_then(|part| part.leading.as_mut()) else {
             return ToMember::Nothing; // it learns by its own silence who leads
         };
         let before = master.wake_ns();
@@ -244,7 +244,7 @@ impl Frames {
             if part.node.master() == sender {
                 part.succession.hear(local_ns);
             }
-            if let Some(master) = &mut part.reign {
+            if let Some(master) = &mut part.leading {
                 master.hear(sender, local_ns);
             }
         }
@@ -272,7 +272,7 @@ impl Frames {
         match part.succession.poll(local_ns) {
             Successor::No => false,
             Successor::Resign => {
-                part.reign = None;
+                part.leading = None;
                 drop(inner);
                 self.led.notify_one();
                 false
@@ -288,7 +288,7 @@ impl Frames {
                 };
                 let mut master = Master::new(settings, part.session, term, first);
                 master.expect(local_ns, &head.members);
-                part.reign = Some(master);
+                part.leading = Some(master);
                 true
             }
         }
@@ -297,7 +297,7 @@ impl Frames {
     /// For the thread that leads: waits for the next RELEASE, for at most `longest`.
     pub(crate) fn lead(&self, now_ns: impl Fn() -> u64, longest: Duration) -> Led {
         let mut inner = self.lock();
-        let Some(master) = inner.as_ref().and_then(|part| part.reign.as_ref()) else {
+        let Some(master) = inner.as_ref().and_then(|part| part.leading.as_ref()) else {
             return Led::Over;
         };
         let now = now_ns();
@@ -315,7 +315,7 @@ impl Frames {
         let Some(part) = inner.as_mut() else {
             return Led::Over;
         };
-        let Some(master) = &mut part.reign else {
+        let Some(master) = &mut part.leading else {
             return Led::Over;
         };
         while master.take_change().is_some() {} // nobody asks
@@ -346,7 +346,7 @@ impl Frames {
         }
     }
 
-    /// The newest RELEASE of this node's reign; `None` where it leads nobody.
+    /// The newest RELEASE of this node's term; `None` where it leads nobody.
     pub(crate) fn own_release(&self) -> Option<Release> {
         self.lock().as_ref()?.own_release()
     }

@@ -124,6 +124,10 @@ impl Hot {
                 .send_datagram(datagram.to_vec().into())
                 .is_ok(),
         };
+        self.count_sent(sent);
+    }
+
+    fn count_sent(&self, sent: bool) {
         let counters = &self.inbound.counters;
         if sent {
             counters.packets_sent.one();
@@ -158,12 +162,7 @@ impl Hot {
             return false;
         };
         let sent = socket.send_to(datagram, address).is_ok();
-        let counters = &self.inbound.counters;
-        if sent {
-            counters.packets_sent.one();
-        } else {
-            counters.send_errors.one();
-        }
+        self.count_sent(sent);
         sent
     }
 

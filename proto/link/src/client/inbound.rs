@@ -9,7 +9,7 @@ use std::{
     time::Instant,
 };
 use taut_proto::{
-    Assembler, ClockFilter, ConstraintSet, DecodeError, EventInbox, EventsTold, PartTaken,
+    Assembler, ClockFilter, ConstraintSet, DecodeError, EventBatch, EventInbox, PartTaken,
     PassedForce, Payload, Role, SessionTime,
     confirmation::{Trust, Unconfirmed},
     path::PathToken,
@@ -188,8 +188,8 @@ impl Inbound {
     }
 
     /// Takes what the control stream tells.
-    pub(crate) fn told_events(&self, told: &EventsTold) {
-        self.lock().events.told(told);
+    pub(crate) fn receive_events(&self, batch: &EventBatch) {
+        self.lock().events.receive(batch);
     }
 
     /// Moves the queued events to the end of `out`.

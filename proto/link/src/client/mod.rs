@@ -1,20 +1,20 @@
 //! Client half of a session.
 
 mod connect;
+mod control;
 mod frame_gate;
 mod frames;
 mod group;
 mod hot;
 mod inbound;
+mod leadership;
 mod link;
 mod mesh_cache;
 mod meshes;
 mod multicast;
 mod options;
-mod reign;
 mod rejoiner;
 mod supervised;
-mod told;
 mod watch;
 
 pub use connect::connect;

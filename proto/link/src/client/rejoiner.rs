@@ -58,7 +58,7 @@ pub struct Rejoiner {
     attempt: Duration,
     sessions: u64,
     /// The last reason told: the same is told once.
-    told: String,
+    last_reason: String,
 }
 
 impl Rejoiner {
@@ -79,7 +79,7 @@ impl Rejoiner {
             rejoin: Rejoin::new(settings, 0),
             attempt: SHORTEST_ATTEMPT,
             sessions: 0,
-            told: String::new(),
+            last_reason: String::new(),
         }
     }
 
@@ -167,9 +167,9 @@ impl Rejoiner {
 
     /// Logs why there is no session, unless it is the same as before.
     pub(crate) fn tell(&mut self, reason: &str) {
-        if self.told != reason {
+        if self.last_reason != reason {
             tracing::warn!("not joined: {reason}; trying again");
-            reason.clone_into(&mut self.told);
+            reason.clone_into(&mut self.last_reason);
         }
     }
 
@@ -185,7 +185,7 @@ impl Rejoiner {
         let now_ns = self.now_ns();
         self.rejoin.joined(now_ns);
         self.sessions += 1;
-        self.told.clear();
+        self.last_reason.clear();
         let longest = self.options.connect_timeout.max(SHORTEST_ATTEMPT);
         self.attempt = (link.control_round_trip() * ROUND_TRIPS).clamp(SHORTEST_ATTEMPT, longest);
         link

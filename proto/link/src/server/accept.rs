@@ -289,7 +289,7 @@ async fn refuse(
         code,
         text: text.clone(),
     });
-    let told = async {
+    let refusal_sent = async {
         let version = refusal.version;
         if write_message(&mut send, &ControlMessage::Refused(refusal), version)
             .await
@@ -299,7 +299,7 @@ async fn refuse(
             connection.closed().await; // the client closes when it has read why
         }
     };
-    if timeout(REFUSAL_TIMEOUT, told).await.is_err() {
+    if timeout(REFUSAL_TIMEOUT, refusal_sent).await.is_err() {
         tracing::debug!("a refused client did not close");
     }
     connection.close(CLOSE_REFUSED, text.as_bytes());

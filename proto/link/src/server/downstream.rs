@@ -3,7 +3,7 @@
 use super::{session::Session, shared::Shared};
 use crate::framing::{WriteMessageError, close_text, write_frame, write_message};
 use quinn::SendStream;
-use taut_proto::{EventsTold, control::ControlMessage};
+use taut_proto::{EventBatch, control::ControlMessage};
 
 /// Writes until the stream or the connection ends; returns why it ended.
 pub(crate) async fn tell(shared: &Shared, session: &Session, send: SendStream) -> String {
@@ -20,17 +20,17 @@ async fn write(
 ) -> Result<(), WriteMessageError> {
     let (mut group, mut events) = (shared.group.follow(), shared.discrete.follow());
     let mut newest = session.after_event;
-    let entry = EventsTold {
+    let entry = EventBatch {
         after: newest,
         records: Vec::new(),
     };
     let version = session.version;
     write_message(&mut send, &ControlMessage::Events(entry), version).await?;
     loop {
-        let told = group.borrow_and_update().clone();
+        let announced = group.borrow_and_update().clone();
         // Before its first own group, the newest one may be that of the others.
-        if let Some(told) = told.filter(|told| told.group.member(session.number).is_some()) {
-            write_frame(&mut send, &told.frame, version).await?;
+        if let Some(new) = announced.filter(|new| new.group.member(session.number).is_some()) {
+            write_frame(&mut send, &new.frame, version).await?;
         }
         // Until the group changes again.
         loop {
@@ -59,11 +59,11 @@ async fn tell_events(
 ) -> Result<u32, WriteMessageError> {
     events.mark_unchanged();
     loop {
-        let told = shared.discrete.told_after(newest);
-        let Some(last) = told.records.last() else {
+        let batch = shared.discrete.batch_after(newest);
+        let Some(last) = batch.records.last() else {
             return Ok(newest);
         };
         newest = last.id;
-        write_message(send, &ControlMessage::Events(told), version).await?;
+        write_message(send, &ControlMessage::Events(batch), version).await?;
     }
 }

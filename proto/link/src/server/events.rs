@@ -4,7 +4,7 @@
 
 use crate::lock::{Mutex, lock};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use taut_proto::{EventOutbox, EventsTold, HotState, events::is_newer};
+use taut_proto::{EventBatch, EventOutbox, HotState, events::is_newer};
 use tokio::sync::watch;
 
 pub(crate) struct EventHub {
@@ -14,7 +14,7 @@ pub(crate) struct EventHub {
     /// Number of the newest event; written by the broadcaster, which takes no lock of the runtime's.
     newest: AtomicU32,
     /// The same for those who follow, a moment later.
-    told: watch::Sender<u32>,
+    newest_sent: watch::Sender<u32>,
 }
 
 impl Default for EventHub {
@@ -23,7 +23,7 @@ impl Default for EventHub {
             outbox: Mutex::default(),
             repeats: AtomicBool::new(false),
             newest: AtomicU32::new(0),
-            told: watch::Sender::new(0),
+            newest_sent: watch::Sender::new(0),
         }
     }
 }
@@ -59,14 +59,14 @@ impl EventHub {
 
     /// Changes when there are new events.
     pub(crate) fn follow(&self) -> watch::Receiver<u32> {
-        self.told.subscribe()
+        self.newest_sent.subscribe()
     }
 
     /// Tells those who follow; called by a task of the runtime, again and again.
     pub(crate) fn publish(&self) {
         let newest = self.newest.load(Ordering::Acquire);
-        self.told
-            .send_if_modified(|told| std::mem::replace(told, newest) != newest);
+        self.newest_sent
+            .send_if_modified(|newest_sent| std::mem::replace(newest_sent, newest) != newest);
     }
 
     /// Number of the newest event.
@@ -80,7 +80,7 @@ impl EventHub {
     }
 
     /// What a client that has all up to `after` is to be told.
-    pub(crate) fn told_after(&self, after: u32) -> EventsTold {
-        lock(&self.outbox).told_after(after)
+    pub(crate) fn batch_after(&self, after: u32) -> EventBatch {
+        lock(&self.outbox).batch_after(after)
     }
 }

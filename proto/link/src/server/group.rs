@@ -34,13 +34,13 @@ const POLL_PERIOD: Duration = Duration::from_millis(20);
 const QUIET_NS: u64 = 30_000_000;
 
 /// The newest group, and its message ready to be written.
-pub(crate) struct Told {
+pub(crate) struct Announcement {
     pub(crate) group: Group,
     pub(crate) frame: Vec<u8>,
 }
 
 pub(crate) struct GroupHub {
-    told: watch::Sender<Option<Arc<Told>>>,
+    announced: watch::Sender<Option<Arc<Announcement>>>,
     /// What the server says to the group.
     pub(crate) sealer: Mutex<GroupSealer>,
     multicast: Option<Multicast>,
@@ -71,7 +71,7 @@ impl GroupHub {
             None => None,
         };
         Ok(GroupHub {
-            told: watch::Sender::new(None),
+            announced: watch::Sender::new(None),
             sealer: Mutex::new(GroupSealer::new(epoch, SERVER_SENDER)),
             multicast,
         })
@@ -117,8 +117,8 @@ impl GroupHub {
     }
 
     /// Follows the group; starts with the newest.
-    pub(crate) fn follow(&self) -> watch::Receiver<Option<Arc<Told>>> {
-        self.told.subscribe()
+    pub(crate) fn follow(&self) -> watch::Receiver<Option<Arc<Announcement>>> {
+        self.announced.subscribe()
     }
 
     fn tell(&self, group: Group, now_ns: u64) -> Result<(), LinkError> {
@@ -128,8 +128,8 @@ impl GroupHub {
             reason: error.to_string(),
         })?;
         lock(&self.sealer).learn(&group, now_ns);
-        self.told
-            .send_replace(Some(Arc::new(Told { group, frame })));
+        self.announced
+            .send_replace(Some(Arc::new(Announcement { group, frame })));
         Ok(())
     }
 }
@@ -147,7 +147,7 @@ pub(crate) async fn run(shared: Arc<Shared>) {
                 Some(secret) => Ok(secret),
                 None => draw_secret(),
             };
-            let told = drawn.and_then(|drawn| {
+            let outcome = drawn.and_then(|drawn| {
                 generation += u32::from(!same);
                 secret = Some(drawn.clone());
                 let group = Group {
@@ -158,7 +158,7 @@ pub(crate) async fn run(shared: Arc<Shared>) {
                 };
                 shared.group.tell(group, shared.clock.now_ns())
             });
-            match told {
+            match outcome {
                 Ok(()) => members = now,
                 Err(error) => tracing::warn!("{error}"),
             }

@@ -241,13 +241,13 @@ fn each_sensor_is_itself_what_is_tracked() {
     );
     for (sensor, (sender, kind, payload)) in (0..).zip(answers) {
         assert_eq!((*sender, kind), (DEVICE, named));
-        let told = PoseReport::decode(payload).expect("valid");
+        let decoded = PoseReport::decode(payload).expect("valid");
         let expected = PoseReport {
             sensor,
             position: [0.0; 3],
             rotation: [0.0, 0.0, 0.0, 1.0],
         };
-        assert_eq!((told, payload.len()), (expected, PoseReport::BYTES));
+        assert_eq!((decoded, payload.len()), (expected, PoseReport::BYTES));
     }
     // Of another device nothing is told.
     let mut other = ServerSession::new("Tracker0", Ipv4Addr::LOCALHOST);

@@ -60,8 +60,8 @@ impl Wanted {
         let mut next = self.loader.change(&self.from, edited)?;
         next.in_file = self.in_file.clone();
         next.not_kept = self.not_kept.clone();
-        let told = tell(&keys, &mut next.not_kept);
-        Ok((next, told))
+        let named = tell(&keys, &mut next.not_kept);
+        Ok((next, named))
     }
 
     /// Another scene, or this one as its file is, with some keys set.
@@ -90,11 +90,11 @@ impl Wanted {
 
 /// What was set, for people; it is added to what is not kept.
 fn tell(keys: &[EditedKey], not_kept: &mut Vec<String>) -> String {
-    let told: Vec<String> = keys.iter().map(ToString::to_string).collect();
-    not_kept.extend(told.iter().cloned());
+    let named: Vec<String> = keys.iter().map(ToString::to_string).collect();
+    not_kept.extend(named.iter().cloned());
     let more = not_kept.len().saturating_sub(MAX_NOT_KEPT);
     not_kept.drain(..more);
-    told.join(", ")
+    named.join(", ")
 }
 
 /// Puts the text of a scene into its file, unless the file is another than the one that was read.

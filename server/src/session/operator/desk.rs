@@ -27,7 +27,7 @@ pub(crate) const NODE: &str = "operator-page";
 /// Told while one session makes way for the next.
 const BETWEEN: &str = "not armed: the scene is being changed; look, and ask again";
 
-type Told = (EventKind, Result<&'static str, &'static str>);
+type Answered = (EventKind, Result<&'static str, &'static str>);
 
 /// What the desk knows of the session, from the thread that looks after it.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ struct Seen {
     clock: SessionClock,
     run: RunState,
     /// Session time at which that was told.
-    told: Option<Duration>,
+    told_at: Option<Duration>,
 }
 
 /// The session that runs, if one does.
@@ -80,7 +80,7 @@ impl OperatorDesk {
             haptics,
             clock,
             run: RunState::Waiting,
-            told: None,
+            told_at: None,
         });
     }
 
@@ -103,7 +103,7 @@ impl OperatorDesk {
     /// Takes what a state says that came at session time `now`.
     pub(super) fn follow_state(&self, run: RunState, now: Duration) {
         if let Some(seen) = &mut self.watched().seen {
-            (seen.run, seen.told) = (run, Some(now));
+            (seen.run, seen.told_at) = (run, Some(now));
         }
     }
 
@@ -126,8 +126,8 @@ impl OperatorDesk {
             return Some(BETWEEN.to_owned());
         };
         let now = seen.clock.now();
-        match seen.told {
-            Some(told) if now.saturating_sub(told) < STATE_PATIENCE => None,
+        match seen.told_at {
+            Some(told_at) if now.saturating_sub(told_at) < STATE_PATIENCE => None,
             _ => Some("not armed: no device sample comes; check that the device runs".to_owned()),
         }
     }
@@ -141,7 +141,7 @@ impl OperatorDesk {
     fn ask<const N: usize>(
         &self,
         wish: ArmWish,
-        answers: [Told; N],
+        answers: [Answered; N],
         settled: impl Fn(RunState) -> Option<Result<&'static str, &'static str>> + Send + 'static,
         over: Result<&'static str, &'static str>,
     ) -> Outcome {
@@ -160,12 +160,12 @@ impl OperatorDesk {
                 return Some(owned(over));
             };
             let mut fresh = answers.iter().zip(before);
-            let told = fresh
+            let answer = fresh
                 .find(|((kind, _), before)| haptics.incidents.of(*kind) > **before)
                 .map(|((_, answer), _)| *answer);
-            let is_after = seen.told.is_some_and(|told| told > *fade);
+            let is_after = seen.told_at.is_some_and(|told_at| told_at > *fade);
             let state = || is_after.then(|| settled(seen.run)).flatten();
-            told.or_else(state).map(owned)
+            answer.or_else(state).map(owned)
         })
     }
 

@@ -100,13 +100,13 @@ pub fn run() -> Vec<Row> {
             "> 95 %",
             held > 0.95,
         ));
-        let told = stroke.was_told(kind) && stroke.was_told(EventKind::RearmNeeded);
-        let kinds: Vec<_> = stroke.told.iter().map(|(kind, _)| *kind).collect();
+        let events = stroke.has_event(kind) && stroke.has_event(EventKind::RearmNeeded);
+        let kinds: Vec<_> = stroke.events.iter().map(|(kind, _)| *kind).collect();
         rows.push(Row::holds(
             format!("{name}: told"),
             format!("{kinds:?}"),
             format!("{kind:?}, RearmNeeded"),
-            told,
+            events,
         ));
         stroke.port().ask_to_arm();
         stroke.run_until(Duration::from_millis(3500));
@@ -120,7 +120,7 @@ pub fn run() -> Vec<Row> {
             if comes_back {
                 again > 2.0
             } else {
-                again == 0.0 && stroke.was_told(EventKind::ArmRefused)
+                again == 0.0 && stroke.has_event(EventKind::ArmRefused)
             },
         ));
     }

@@ -78,7 +78,7 @@ pub fn run() -> Vec<Row> {
     let mut rows = saturated();
     // R11's speeds, and one between: up to 1 N/ms.
     for speed in [0.05, 0.3, 0.6, 1.0] {
-        let (differs, told) = contact(speed);
+        let (differs, acts) = contact(speed);
         rows.push(Row::at_most(
             format!("1000 N/m at {speed} m/s: rendered - commanded"),
             differs,
@@ -87,12 +87,12 @@ pub fn run() -> Vec<Row> {
         ));
         rows.push(Row::holds(
             format!("1000 N/m at {speed} m/s: slew limit"),
-            if told { "acts" } else { "does not act" },
+            if acts { "acts" } else { "does not act" },
             "does not act",
-            !told,
+            !acts,
         ));
     }
-    let (step, told) = unexplained();
+    let (step, acts) = unexplained();
     rows.push(Row::at_most(
         "20 N at once on a hand that rests: largest step",
         step,
@@ -101,9 +101,9 @@ pub fn run() -> Vec<Row> {
     ));
     rows.push(Row::holds(
         "20 N at once on a hand that rests: slew limit",
-        if told { "acts" } else { "does not act" },
+        if acts { "acts" } else { "does not act" },
         "acts",
-        told,
+        acts,
     ));
     rows
 }
@@ -153,7 +153,7 @@ fn saturated() -> Vec<Row> {
 /// Meets the wall: largest difference of what is rendered from what is commanded, and whether the slew limit acted.
 fn contact(speed: f64) -> (f64, bool) {
     let mut port = port(speed);
-    let (mut largest, mut told) = (0.0_f64, false);
+    let (mut largest, mut acts) = (0.0_f64, false);
     let mut tick = 0;
     while (PERIOD * tick).as_secs_f64() < MET_AT + DEPTH / speed {
         let now = PERIOD * tick;
@@ -163,29 +163,29 @@ fn contact(speed: f64) -> (f64, bool) {
             Some(Command::fresh(now, commanded))
         });
         largest = largest.max((report.wrench - commanded).norm());
-        told |= report
+        acts |= report
             .events
             .iter()
             .any(|event| event.kind == EventKind::ForceSlewLimited);
         tick += 1;
     }
-    (largest, told)
+    (largest, acts)
 }
 
 /// A command that jumps while the hand rests: largest change of what is rendered, and whether the slew limit acted.
 fn unexplained() -> (f64, bool) {
     let mut port = port(0.0);
-    let (mut largest, mut told, mut before) = (0.0_f64, false, Vector6::zeros());
+    let (mut largest, mut acts, mut before) = (0.0_f64, false, Vector6::zeros());
     for tick in 0..1000 {
         let now = PERIOD * tick;
         let asked = Vector6::z() * if tick < 800 { 0.0 } else { 20.0 };
         let report = port.tick(now, |_| Some(Command::fresh(now, asked)));
         largest = largest.max((report.wrench - before).norm());
         before = report.wrench;
-        told |= report
+        acts |= report
             .events
             .iter()
             .any(|event| event.kind == EventKind::ForceSlewLimited);
     }
-    (largest, told)
+    (largest, acts)
 }

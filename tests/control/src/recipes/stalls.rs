@@ -57,13 +57,13 @@ struct Seen {
 }
 
 /// A simulated device that tells what was written to it.
-struct Told {
+struct StalledDevice {
     device: SimulatedDevice,
     written: Arc<Mutex<Vector3<f64>>>,
     read: Arc<Mutex<Vector3<f64>>>,
 }
 
-impl Device for Told {
+impl Device for StalledDevice {
     fn info(&self) -> &DeviceInfo {
         self.device.info()
     }
@@ -161,7 +161,7 @@ fn judge(stalled: Stalled, milliseconds: u32, seen: &Seen) -> Vec<Row> {
 fn stall(stalled: Stalled, milliseconds: u32) -> Option<Seen> {
     let scene = Scene::named_or_file("sphere-on-plane").ok()?.build().ok()?;
     let [written, read] = [(); 2].map(|()| Arc::<Mutex<Vector3<f64>>>::default());
-    let device = Told {
+    let device = StalledDevice {
         device: pressing_hand(&scene)?,
         written: Arc::clone(&written),
         read: Arc::clone(&read),
@@ -210,7 +210,7 @@ fn stall(stalled: Stalled, milliseconds: u32) -> Option<Seen> {
     Some(seen)
 }
 
-fn wired(scene: &BuiltScene, device: Told) -> Option<WiredLoops> {
+fn wired(scene: &BuiltScene, device: StalledDevice) -> Option<WiredLoops> {
     let world = Arc::new(scene.world.clone());
     let start = Pose::translation(0.0, 0.0, 0.04);
     let god_object = GodObject::new(world.clone(), scene.settings, start).ok()?;

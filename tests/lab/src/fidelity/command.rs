@@ -50,7 +50,7 @@ pub fn run(arguments: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn 
 
 /// What is done with the scenes that were held out.
 enum HeldOut {
-    /// Says what is foretold of them.
+    /// Says what is predicted of them.
     Predict,
     /// Runs them, against what was committed.
     Run,

@@ -1,4 +1,4 @@
-//! The first questions of a reader: who passes what, were the failures seen that theory foretells, and what was not run.
+//! The first questions of a reader: who passes what, were the failures seen that theory predicts, and what was not run.
 
 use std::fmt::Write as _;
 
@@ -72,7 +72,7 @@ fn matrix(page: &mut String, results: &Results, rate: u32) -> std::fmt::Result {
 }
 
 /// A failure that is known of a method before anything is run.
-struct Foretold {
+struct Prediction {
     recipe: &'static str,
     case: &'static str,
     method: Method,
@@ -95,11 +95,11 @@ enum Figure {
 const WITHIN: f64 = 0.1;
 
 /// Depths by the delays of the paper's loop at 0.3 m/s, `v (1/k_s + 1/2) / f` and half a tick; the others by what the methods are.
-const FORETOLD: [Foretold; 7] = [
+const PREDICTIONS: [Prediction; 7] = [
     late(70, 10.9e-3),
     late(300, 2.65e-3),
     late(1000, 0.90e-3),
-    Foretold {
+    Prediction {
         recipe: "R02",
         case: "ball on a plane",
         method: Method::VirtualCoupling,
@@ -108,7 +108,7 @@ const FORETOLD: [Foretold; 7] = [
         figure: Figure::Above(0.02),
         why: "artificial friction: the proxy trails the hand, and its spring pulls back",
     },
-    Foretold {
+    Prediction {
         recipe: "R09",
         case: "plate of 0.1 mm",
         method: Method::Discrete,
@@ -117,7 +117,7 @@ const FORETOLD: [Foretold; 7] = [
         figure: Figure::Above(0.01),
         why: "pop-through: a step spans plate and body, and nothing is looked for on the way",
     },
-    Foretold {
+    Prediction {
         recipe: "R09",
         case: "plate of 1 mm",
         method: Method::Penalty,
@@ -126,7 +126,7 @@ const FORETOLD: [Foretold; 7] = [
         figure: Figure::Above(0.01),
         why: "pop-through: past the middle the nearest way out is the far side",
     },
-    Foretold {
+    Prediction {
         recipe: "R01",
         case: "Lissajous figure",
         method: Method::VirtualCoupling,
@@ -137,8 +137,8 @@ const FORETOLD: [Foretold; 7] = [
     },
 ];
 
-const fn late(rate: u32, depth: f64) -> Foretold {
-    Foretold {
+const fn late(rate: u32, depth: f64) -> Prediction {
+    Prediction {
         recipe: "R11",
         case: "0.3 m/s",
         method: Method::Paper,
@@ -149,17 +149,17 @@ const fn late(rate: u32, depth: f64) -> Foretold {
     }
 }
 
-/// The failures that theory foretells, beside what was measured.
-pub(super) fn foretold(page: &mut String, results: &Results) -> std::fmt::Result {
+/// The failures that theory predicts, beside what was measured.
+pub(super) fn predicted(page: &mut String, results: &Results) -> std::fmt::Result {
     page.push_str(
-        "<h2 id=foretold>Failures that are foretold</h2>\n<p>A laboratory that does not see these would prove nothing by a pass.</p>\n\
-         <table><tr><th>recipe<th>case<th>method<th>rate<th>measure<th>foretold<th>measured<th>where<th>why\n",
+        "<h2 id=predicted>Failures that are predicted</h2>\n<p>A laboratory that does not see these would prove nothing by a pass.</p>\n\
+         <table><tr><th>recipe<th>case<th>method<th>rate<th>measure<th>predicted<th>measured<th>where<th>why\n",
     );
-    for foretold in &FORETOLD {
-        let Some((value, unit, place)) = measured(results, foretold) else {
+    for predicted in &PREDICTIONS {
+        let Some((value, unit, place)) = measured(results, predicted) else {
             continue;
         };
-        let (expected, seen) = match foretold.figure {
+        let (expected, seen) = match predicted.figure {
             Figure::Mean(mean) => (
                 format!("mean {}, within 10 %", readable(mean, &unit)),
                 (value - mean).abs() <= WITHIN * mean,
@@ -172,16 +172,16 @@ pub(super) fn foretold(page: &mut String, results: &Results) -> std::fmt::Result
         writeln!(
             page,
             "<tr><td><a href=\"#{0}\">{0}</a><td>{1}<td>{2}<td class=key>{3} Hz<td>{4}<td>{5}<td class=\"{6} key\">{7}<td>{8}<td>{9}",
-            foretold.recipe,
-            escaped(foretold.case),
-            foretold.method.name(),
-            foretold.rate,
-            foretold.measure,
+            predicted.recipe,
+            escaped(predicted.case),
+            predicted.method.name(),
+            predicted.rate,
+            predicted.measure,
             escaped(&expected),
             if seen { "pass" } else { "fail" },
             readable(value, &unit),
             place,
-            foretold.why
+            predicted.why
         )?;
     }
     page.push_str("</table>\n");
@@ -198,15 +198,15 @@ fn readable(value: f64, unit: &str) -> String {
 }
 
 /// Value, unit, and where it stands.
-fn measured(results: &Results, foretold: &Foretold) -> Option<(f64, String, String)> {
+fn measured(results: &Results, predicted: &Prediction) -> Option<(f64, String, String)> {
     let row = results.rows.iter().find(|row| {
-        (row.recipe, row.case.as_str()) == (foretold.recipe, foretold.case)
-            && row.method == foretold.method.name()
-            && row.rate == Some(foretold.rate)
-            && row.measure == foretold.measure
+        (row.recipe, row.case.as_str()) == (predicted.recipe, predicted.case)
+            && row.method == predicted.method.name()
+            && row.rate == Some(predicted.rate)
+            && row.measure == predicted.measure
     })?;
     let unit = row.unit.replace('-', "");
-    let Figure::Mean(_) = foretold.figure else {
+    let Figure::Mean(_) = predicted.figure else {
         let place = format!("rows.csv, line {}", line_of(results, row));
         return Some((row.value, unit, place));
     };
@@ -214,8 +214,8 @@ fn measured(results: &Results, foretold: &Foretold) -> Option<(f64, String, Stri
     let mut line = 2;
     for outcome in &results.outcomes {
         let last = line + outcome.phases.len() - 1;
-        let is_it = (outcome.recipe, outcome.case.as_str()) == (foretold.recipe, foretold.case)
-            && (outcome.method, outcome.rate) == (foretold.method, foretold.rate);
+        let is_it = (outcome.recipe, outcome.case.as_str()) == (predicted.recipe, predicted.case)
+            && (outcome.method, outcome.rate) == (predicted.method, predicted.rate);
         if is_it {
             let mean = outcome.mean(Measure::FirstForceDepth);
             return Some((mean, unit, format!("measures.csv, lines {line} to {last}")));

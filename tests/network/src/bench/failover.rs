@@ -18,7 +18,7 @@ use super::{BenchError, Quantiles, keep_cores_awake, request_fifo, wait_until};
 pub const NODES: usize = 3;
 /// Frames in a row of one session, which a node shows while clocks lock and it falls in step, and again under each leader: three seconds, or as long as
 /// it takes on a machine that pauses this program.
-const REIGN: u64 = 3 * RATE;
+const FRAMES_OF_A_TERM: u64 = 3 * RATE;
 /// Time after the return that counts as part of it.
 const RETURN: Duration = Duration::from_secs(2);
 
@@ -145,7 +145,7 @@ fn lowest_session(screens: &[Screen]) -> usize {
     (0..screens.len()).min_by_key(session).unwrap_or(0)
 }
 
-/// Waits until every node has shown [`REIGN`] frames of one session, none of them beside a pause for which the server may give it up.
+/// Waits until every node has shown [`FRAMES_OF_A_TERM`] frames of one session, none of them beside a pause for which the server may give it up.
 fn wait_in_step(screens: &[Screen], node_timeout: Duration) -> Result<(), BenchError> {
     let now = || -> Vec<(u64, u64)> {
         let state = |screen: &Screen| (screen.sessions(), screen.shown());
@@ -162,17 +162,18 @@ fn wait_in_step(screens: &[Screen], node_timeout: Duration) -> Result<(), BenchE
         }
         new.iter()
             .zip(&from)
-            .all(|(new, from)| new.1 >= from.1 + REIGN)
+            .all(|(new, from)| new.1 >= from.1 + FRAMES_OF_A_TERM)
     })
 }
 
-/// Waits until every node has shown [`REIGN`] more frames, the newest of a node's reign after the frame `before`.
+/// Waits until every node has shown [`FRAMES_OF_A_TERM`] more frames, the newest of a node's term after the frame `before`.
 fn wait_without_server(what: &str, screens: &[Screen], before: u64) -> Result<(), BenchError> {
     let from: Vec<u64> = screens.iter().map(Screen::shown).collect();
     wait_until(what, || {
         let mut each = screens.iter().zip(&from);
         each.all(|(screen, from)| {
-            screen.shown() >= from + REIGN && screen.frame() > before + FRAMES_LEFT_OUT / 2
+            screen.shown() >= from + FRAMES_OF_A_TERM
+                && screen.frame() > before + FRAMES_LEFT_OUT / 2
         })
     })
 }

@@ -212,7 +212,7 @@ pub struct Together {
 /// What the nodes showed together, of frames for which `counts`.
 #[must_use]
 pub fn together(nodes: &[Vec<Swapped>], counts: impl Fn(&Swapped) -> bool) -> Together {
-    // A frame of one reign has one number and one count of sessions.
+    // A frame of one term has one number and one count of sessions.
     let mut frames: HashMap<(u64, u64), Vec<&Swapped>> = HashMap::new();
     for swapped in nodes.iter().flatten().filter(|swapped| counts(swapped)) {
         let key = (swapped.sessions, swapped.frame);

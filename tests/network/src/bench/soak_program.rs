@@ -100,7 +100,7 @@ struct Cast {
     observer: TcpStream,
     restarts: Restarts,
     tell: mpsc::Sender<String>,
-    told: mpsc::Receiver<String>,
+    broken: mpsc::Receiver<String>,
     result: ProgramSoak,
 }
 
@@ -118,7 +118,7 @@ impl Cast {
         let hand = hand.ok_or_else(|| BenchError::Missing("the scene has no hand".to_owned()))?;
         let hand = workbench.write("hand.csv", &hand.to_csv())?;
         let server = workbench.serve(None)?;
-        let (tell, told) = mpsc::channel();
+        let (tell, broken) = mpsc::channel();
         let mut cast = Cast {
             hand: hand.display().to_string(),
             quic: server.quic.clone(),
@@ -133,7 +133,7 @@ impl Cast {
             observer: observe(&http.to_string())?,
             restarts: Restarts::default(),
             tell,
-            told,
+            broken,
             result: ProgramSoak::default(),
             workbench,
         };
@@ -277,7 +277,7 @@ impl Cast {
 
     /// What the nodes found since the last time.
     fn findings(&mut self, log: &mut SoakLog) -> Result<(), BenchError> {
-        self.told.try_iter().try_for_each(|what| log.broke(&what))
+        self.broken.try_iter().try_for_each(|what| log.broke(&what))
     }
 
     /// Everybody ends in peace.

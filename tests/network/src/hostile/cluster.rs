@@ -4,7 +4,7 @@ use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use taut_link::proto::barrier::{Arrive, MAX_MEMBERS, MOST_REIGNS_AHEAD, MasterSettings, Swap};
+use taut_link::proto::barrier::{Arrive, MAX_MEMBERS, MOST_TERMS_AHEAD, MasterSettings, Swap};
 use taut_link::proto::events::EventAck;
 use taut_link::proto::header::MAX_DATAGRAM_BYTES;
 use taut_link::proto::state::RunState;
@@ -36,7 +36,7 @@ pub(super) const ATTACKS: &[Attack] = &[
     },
     Attack {
         name: "last_term",
-        tried: "a render node claims reigns at the end of the numbers, and of the window that counts, under its own keys",
+        tried: "a render node claims terms at the end of the numbers, and of the window that counts, under its own keys",
         promised: "the numbers are refused, the server leads on, and its term stays where a successor's fits above it",
         run: last_term,
     },
@@ -233,7 +233,7 @@ fn last_term(_: &Extent) -> Result<Finding, BenchError> {
             }))
         };
         // At the end of 32 bits, and one beyond the window; a number beyond its range does not even seal.
-        let claims = [u64::from(u32::MAX), 2 + MOST_REIGNS_AHEAD];
+        let claims = [u64::from(u32::MAX), 2 + MOST_TERMS_AHEAD];
         for term in claims {
             claim(term)?;
         }
@@ -248,7 +248,7 @@ fn last_term(_: &Extent) -> Result<Finding, BenchError> {
             report(&server).counts.refused >= before.refused + claims.len() as u64
         })?;
         // One at the edge of the window counts: the server leads on above it.
-        claim(1 + MOST_REIGNS_AHEAD)?;
+        claim(1 + MOST_TERMS_AHEAD)?;
         wait_until("the server leads on", || {
             let now = report(&server).counts;
             now.reclaimed > before.reclaimed && now.released > before.released + 20
@@ -294,7 +294,7 @@ fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
     let screen = runtime.block_on(connect(options))?;
     let observer = credential(&key, Role::Observer, "liar");
     let mut liar = runtime.block_on(Liar::join(&server, &observer, Role::Observer, "liar"))?;
-    let told = runtime.block_on(liar.group_with("screen"))?;
+    let group = runtime.block_on(liar.group_with("screen"))?;
     while_serving(&server, &[], || {
         let by_multicast = || {
             let clients = server.clients();
@@ -309,7 +309,7 @@ fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
         let alarms_before = screen.states_withdrawn();
         states.clear();
 
-        let (mut sealer, socket) = (liar.as_server(&told), to_groups()?);
+        let (mut sealer, socket) = (liar.as_server(&group), to_groups()?);
         let (begun, mut sent, mut found, mut drawn) = (Instant::now(), 0, None, 0);
         while found.is_none() && begun.elapsed() < Duration::from_secs(5) {
             let now_ns = server.clock().now_ns();

@@ -38,7 +38,7 @@ struct Rig {
     /// Largest change of the force in a write, N, and in a millisecond, N/ms.
     step: (f64, f64),
     fastest: f64,
-    told: Vec<EventKind>,
+    events: Vec<EventKind>,
 }
 
 impl Rig {
@@ -62,7 +62,7 @@ impl Rig {
             period,
             step: (0.0, 0.0),
             fastest: 0.0,
-            told: Vec::new(),
+            events: Vec::new(),
         }
     }
 
@@ -77,7 +77,7 @@ impl Rig {
                 ..Command::fresh(self.now, wrench)
             };
             let report = self.port.tick(self.now, |_| Some(command));
-            self.told
+            self.events
                 .extend(report.events.iter().map(|event| event.kind));
             let change = (report.wrench - before).fixed_rows::<3>(0).norm();
             let rate = change / self.period.as_secs_f64();
@@ -113,7 +113,7 @@ fn outage(_extent: &Extent) -> Result<Finding, BenchError> {
     let mut replaced = armed();
     replaced.port.restart(CommandSource::Other);
     replaced.run(Duration::from_secs(2), None, push);
-    let asked = |rig: &Rig| rig.told.contains(&EventKind::RearmNeeded);
+    let asked = |rig: &Rig| rig.events.contains(&EventKind::RearmNeeded);
     Ok(Finding {
         happened: format!(
             "armed {before:.1} N; 2 s after 0.9 s of silence {:.1} N, after 5 s {:.1} N, from another process {:.1} N",

@@ -359,7 +359,7 @@ fn other_release(_: &Extent) -> Result<Finding, BenchError> {
     let error = runtime.block_on(connect(options)).err();
     let node = error.map_or("let in".to_owned(), |error| error.to_string());
     let end = Instant::now() + Duration::from_secs(5);
-    let told = loop {
+    let said_by_server = loop {
         match server.try_event() {
             Some(taut_link::LinkEvent::Refused { text, .. }) => break text,
             _ if Instant::now() > end => break "nothing".to_owned(),
@@ -369,7 +369,7 @@ fn other_release(_: &Extent) -> Result<Finding, BenchError> {
     let both = [newer.to_string(), VersionRange::SUPPORTED.to_string()];
     let names_both = |text: &str| both.iter().all(|version| text.contains(version));
     Ok(Finding {
-        kept: names_both(&node) && names_both(&told) && server.clients().is_empty(),
-        happened: format!("the node: {node}; the server: {told}"),
+        kept: names_both(&node) && names_both(&said_by_server) && server.clients().is_empty(),
+        happened: format!("the node: {node}; the server: {said_by_server}"),
     })
 }

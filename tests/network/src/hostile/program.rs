@@ -290,7 +290,7 @@ fn flood_of_refusals(extent: &Extent) -> Result<Finding, BenchError> {
         server.lines_with(&parts).len()
     };
     let deeds = [of_alice("event=\"joined\""), of_alice("event=\"disarm\"")];
-    let told = server.lines_with(&["event=\"refused\""]).len();
+    let lines = server.lines_with(&["event=\"refused\""]).len();
     let faked = server.lines_with(&["event=\"arm\""]);
     let faked = faked
         .iter()
@@ -298,10 +298,10 @@ fn flood_of_refusals(extent: &Extent) -> Result<Finding, BenchError> {
     let (faked, raw) = (faked.count(), server.lines_with(&["\u{1b}"]).len());
     Ok(Finding {
         happened: format!(
-            "{refused} refused in {told} lines; joined and disarmed by alice: {deeds:?}; {faked} faked lines, {raw} with control sequences"
+            "{refused} refused in {lines} lines; joined and disarmed by alice: {deeds:?}; {faked} faked lines, {raw} with control sequences"
         ),
         kept: refused == STRANGERS
-            && (1..=STRANGERS / 10).contains(&told)
+            && (1..=STRANGERS / 10).contains(&lines)
             && deeds == [1, 1]
             && faked + raw == 0,
     })

@@ -18,8 +18,8 @@ pub(crate) async fn listen(hot: Arc<Hot>, mut recv: RecvStream, all_states: bool
                 hot.group.learn(group, hot.inbound.local_ns(Instant::now()));
                 hot.follow_group(all_states);
             }
-            Ok(ControlMessage::Events(told)) => {
-                hot.inbound.told_events(&told);
+            Ok(ControlMessage::Events(batch)) => {
+                hot.inbound.receive_events(&batch);
                 hot.acknowledge();
             }
             Ok(other) => break format!("the server sent {}", other.name()),

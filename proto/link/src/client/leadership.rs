@@ -138,7 +138,7 @@ impl Hot {
         }
     }
 
-    /// To every render node, one right after the other: also to those that follow somebody else, who are to learn of this reign. One datagram is
+    /// To every render node, one right after the other: also to those that follow somebody else, who are to learn of this term. One datagram is
     /// sealed for all, since all have the same key of this sender.
     fn send_to_screens(&self, payload: &Payload) {
         let mut buffer = [0; MAX_DATAGRAM_BYTES];
