@@ -71,9 +71,9 @@ fn main() {
     let mut buffer = [0; MAX_DATAGRAM_BYTES];
     let mut payload = [0; MAX_PAYLOAD_BYTES];
     let length = encode_into(&confirmation, &mut payload).unwrap_or(0);
-    let payload = Payload::Confirm(confirmation);
+    let message = Payload::Confirm(confirmation);
     let seal = us(|| {
-        black_box(sealer.seal(&payload, &mut buffer).is_ok());
+        black_box(sealer.seal(&message, &mut buffer).is_ok());
     });
     let open = us(|| {
         let mut buffer = [0; MAX_DATAGRAM_BYTES];

@@ -206,7 +206,7 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
     let reference_point = scene.reference_point();
     let mut states = StateWriter::new(readers.broadcast, head, &reference_point, 1);
     let first = session.now + TICK;
-    let (mut now, mut states) = (session.now, 0);
+    let (mut now, mut count) = (session.now, 0);
     for _ in 0..9000 {
         now += TICK;
         haptics.tick(now);
@@ -229,9 +229,9 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
             .sum::<f32>();
         // Nothing squeezes the body: the plate is where it was sent.
         assert!(error < 1e-8 && turn.abs() > 1.0 - 1e-6, "{body:?} {pose:?}");
-        states += 1;
+        count += 1;
     }
-    assert_eq!(states, 9000);
+    assert_eq!(count, 9000);
 }
 
 #[test]

@@ -294,7 +294,7 @@ fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
     let screen = runtime.block_on(connect(options))?;
     let observer = credential(&key, Role::Observer, "liar");
     let mut liar = runtime.block_on(Liar::join(&server, &observer, Role::Observer, "liar"))?;
-    let group = runtime.block_on(liar.group_with("screen"))?;
+    let known = runtime.block_on(liar.group_with("screen"))?;
     while_serving(&server, &[], || {
         let by_multicast = || {
             let clients = server.clients();
@@ -309,7 +309,7 @@ fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
         let alarms_before = screen.states_withdrawn();
         states.clear();
 
-        let (mut sealer, socket) = (liar.as_server(&group), to_groups()?);
+        let (mut sealer, socket) = (liar.as_server(&known), to_groups()?);
         let (begun, mut sent, mut found, mut drawn) = (Instant::now(), 0, None, 0);
         while found.is_none() && begun.elapsed() < Duration::from_secs(5) {
             let now_ns = server.clock().now_ns();
