@@ -6,6 +6,7 @@ pub(crate) mod haply;
 pub(crate) mod held_arm;
 pub(crate) mod held_strings;
 pub(crate) mod led;
+pub(crate) mod pace;
 pub(crate) mod plugin;
 pub(crate) mod polhem;
 pub(crate) mod rate_control;

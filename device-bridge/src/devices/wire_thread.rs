@@ -16,6 +16,7 @@ use std::thread;
 use std::time::Duration;
 
 use super::arm::{ArmPort, ArmState};
+use super::pace::Pace;
 use crate::realtime::{self, monotonic_now};
 
 /// From the last write of the device's loop on nothing is commanded any more.
@@ -40,6 +41,11 @@ pub(crate) trait Wire: Send + 'static {
 
     /// For people, with its place: "the Polhem board on /dev/ttyUSB0".
     fn name(&self) -> String;
+
+    /// Whether a state answers each command: then how long that takes is reported.
+    fn answers(&self) -> bool {
+        true
+    }
 
     /// Opens the device and exchanges commands for states until [`Line::is_over`], or until it is lost; at either end zero is the last word.
     fn session(&mut self, line: &mut Line<Self::State, Self::Command>) -> Result<(), Self::Lost>;
@@ -72,6 +78,10 @@ pub(crate) struct Line<S: Send, C: Send> {
     wanted: triple_buffer::Output<Written<C>>,
     /// Writes of the device's loop, and when the last was seen.
     seen: (u64, Duration),
+    /// Of this session, where a state answers each command.
+    pace: Option<Pace>,
+    /// When the command was taken that the next state answers.
+    asked: Option<Duration>,
     end: Arc<AtomicBool>,
 }
 
@@ -89,10 +99,17 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
     /// Hands the state on.
     pub(crate) fn publish(&mut self) {
         self.out.write(self.state);
+        if let Some(pace) = &mut self.pace {
+            pace.read();
+            if let Some(asked) = self.asked.take() {
+                pace.cycle(asked);
+            }
+        }
     }
 
     /// What is commanded at `now`; `None` where nobody has written within [`HOLDS`].
     pub(crate) fn command(&mut self, now: Duration) -> Option<C> {
+        self.asked = Some(now);
         let wanted = *self.wanted.read();
         if wanted.writes != self.seen.0 {
             self.seen = (wanted.writes, now);
@@ -134,6 +151,8 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             out,
             wanted: taken,
             seen: (0, Duration::ZERO),
+            pace: None,
+            asked: None,
             end: Arc::clone(&end),
         };
         let name = wire.name();
@@ -213,7 +232,11 @@ fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
     let mut last_lost = String::new();
     while !line.is_over() {
         let begun = monotonic_now();
-        let Err(lost) = wire.session(&mut line) else {
+        line.pace = wire.answers().then(|| Pace::new(&wire.name()));
+        line.asked = None;
+        let ended = wire.session(&mut line);
+        line.pace = None; // it reports
+        let Err(lost) = ended else {
             return;
         };
         line.state.lose();

@@ -16,7 +16,6 @@ mod error;
 #[cfg(unix)]
 mod frame;
 mod library;
-mod pace;
 #[cfg(unix)]
 mod printed;
 #[cfg(unix)]

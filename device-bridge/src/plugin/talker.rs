@@ -8,8 +8,8 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::Duration;
 
 use super::claims::{PluginInfo, RawSample, Worth};
-use super::pace::Pace;
 use super::{Answer, Language, OpenDevice, Opener, PluginError};
+use crate::devices::pace::Pace;
 use crate::devices::wire_thread::{HOLDS, Line, Wire, WireThread, ask_for_real_time};
 use crate::devices::{ArmPort, ArmState};
 use crate::realtime::{Ticker, monotonic_now};
@@ -99,6 +99,11 @@ impl Wire for Talker {
     fn name(&self) -> String {
         let info = self.calls.info.as_ref();
         info.map_or_else(|| "the plug-in".to_owned(), |info| info.name.clone())
+    }
+
+    /// It is read first and written then, and measures that itself.
+    fn answers(&self) -> bool {
+        false
     }
 
     fn session(&mut self, line: &mut PluginLine) -> Result<(), String> {

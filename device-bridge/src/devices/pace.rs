@@ -1,4 +1,4 @@
-//! How long the calls of a device take, told when it is closed or gone.
+//! How fast a device is read and written, reported when it is closed or gone.
 
 use std::time::Duration;
 
@@ -6,15 +6,15 @@ use hdrhistogram::Histogram;
 
 use crate::realtime::monotonic_now;
 
-/// Longest time that is told apart, us: 10 s.
+/// Longest time that is counted as it is, us: 10 s.
 const LONGEST_US: u64 = 10_000_000;
-/// Fewer calls say nothing.
+/// Fewer exchanges say nothing.
 const LEAST: u64 = 100;
 
 /// Times of one opening of a device. Recording allocates nothing.
-pub(super) struct Pace {
+pub(crate) struct Pace {
     name: String,
-    /// From the beginning of a read to the end of the write after it, us.
+    /// How long a command and the reading that belongs to it took together, us.
     cycles: Option<Histogram<u64>>,
     /// From a sample to the next, us.
     periods: Option<Histogram<u64>>,
@@ -22,7 +22,7 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    pub(super) fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         let histogram = || Histogram::new_with_bounds(1, LONGEST_US, 3).ok(); // the bounds are good
         Self {
             name: name.to_owned(),
@@ -32,16 +32,16 @@ impl Pace {
         }
     }
 
-    /// A read came back.
-    pub(super) fn read(&mut self) {
+    /// A reading came.
+    pub(crate) fn read(&mut self) {
         let now = monotonic_now();
         if let Some(last) = self.last.replace(now) {
             record(&mut self.periods, now.saturating_sub(last));
         }
     }
 
-    /// A write came back, of a cycle that began at `begun`.
-    pub(super) fn cycle(&mut self, begun: Duration) {
+    /// A cycle that began at `begun` is over.
+    pub(crate) fn cycle(&mut self, begun: Duration) {
         record(&mut self.cycles, monotonic_now().saturating_sub(begun));
     }
 }
