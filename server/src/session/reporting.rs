@@ -2,7 +2,6 @@
 
 use std::sync::atomic::Ordering;
 
-use god_object::spatial::linear;
 use taut_bridge::EventKind;
 use taut_link::{LinkEvent, ServerLink, proto};
 use taut_recording::EventRecord;
@@ -158,12 +157,12 @@ impl Session {
     }
 
     /// One line of what goes on.
-    pub fn status_line(&mut self) -> String {
+    pub fn status_line(&self) -> String {
         let statistics = &self.statistics;
         let seconds = self.age().as_secs_f64();
         let period = statistics.haptics.period.distribution_us();
         let update = statistics.god_object.update.distribution_us();
-        let force = linear(&self.wrench.newest().wrench).norm();
+        let [force, _] = statistics.haptics.felt();
         let checks = &statistics.checks;
         format!(
             "{seconds:5.0} s  haptics {:.0} Hz, p99 {:.2} ms  god-object p99 {:.2} ms  contacts {}  force {force:.2} N  clients {}  penetrations {} of {}",
