@@ -11,11 +11,12 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::descent::open;
+use super::descent::{Opened, open};
 use super::displacements::Motions;
 use super::facing_volumes::FacingVolumes;
 use super::turned::TurnedNodes;
 use super::work::Work;
+use crate::geometry::lanes::LANES;
 use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
 
 /// Number of bands, K. The first is a two-thousandth of the margin wide. More of them would leave the trees' nodes in an order that the cache
@@ -30,6 +31,8 @@ const NONE: u32 = u32::MAX;
 
 /// Bands of a search by clearance: as many for what is violated, the deepest first.
 const SIGNED_BANDS: usize = 2 * BANDS;
+/// The band of what is left out.
+const OUT_OF_QUESTION: u32 = SIGNED_BANDS as u32;
 
 /// Pairs that wait, by band; the last one of a band is the first out. No allocation after `new`.
 #[derive(Clone, Debug)]
@@ -101,12 +104,14 @@ fn edge(band: usize, margin: f64) -> f64 {
     margin * (1.0 - EDGE_ROUNDING) / f64::from(1_u32 << (BANDS - band))
 }
 
-/// The band of a share `d / D`; NaN is near.
-#[inline]
-fn band_of(share: f32) -> usize {
+/// The band of a share `d / D`; NaN is near. Without branches: the compiler makes vectors of eight.
+#[inline(always)]
+fn band_of(share: f32) -> u32 {
+    const LAST: u32 = BANDS as u32 - 1;
     // The exponent of the number says how often the margin is halved.
-    let exponent = (share.max(f32::MIN_POSITIVE).to_bits() >> 23) as usize;
-    (exponent + BANDS).saturating_sub(127)
+    let exponent = share.max(f32::MIN_POSITIVE).to_bits() >> 23;
+    let band = exponent.max(126 - LAST) - (126 - LAST);
+    band.min(LAST)
 }
 
 /// Calls `visit` for the pairs of triangles, (body, obstacle), whose volumes may come within `margin` and face each other all the way down,
@@ -122,7 +127,7 @@ pub(crate) fn for_nearest_triangle_pairs(
     visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) -> f64 {
     let scale = (1.0 / margin) as f32;
-    let band = |_, beyond: f32| Some(band_of(1.0 + beyond * scale).min(BANDS - 1));
+    let bands_of = |opened: &Opened| opened.map(|beyond| band_of(1.0 + beyond * scale));
     let stopped_in = volumes.processor.dispatch(ByBand {
         trees,
         volumes,
@@ -130,14 +135,14 @@ pub(crate) fn for_nearest_triangle_pairs(
         turned,
         work,
         wanted,
-        band_of_pair: band,
+        bands_of,
         visit,
     });
     stopped_in.map_or(margin, |band| edge(band, margin))
 }
 
-/// A search that visits pairs of triangles in the order of the bands that `band_of_pair` puts pairs of volumes in, from what these are beyond the margin
-/// (m); `None` leaves a pair out. The answer is the band in which it ended because `visit` returned false or there was no room.
+/// A search that visits pairs of triangles in the order of the bands that `bands_of` puts pairs of volumes in that were opened; [`OUT_OF_QUESTION`]
+/// leaves a pair out. The answer is the band in which it ended because `visit` returned false or there was no room.
 struct ByBand<'a, W, B, V> {
     trees: (&'a WideTree, &'a WideTree),
     volumes: &'a FacingVolumes,
@@ -145,7 +150,7 @@ struct ByBand<'a, W, B, V> {
     turned: &'a mut TurnedNodes,
     work: &'a mut Work,
     wanted: W,
-    band_of_pair: B,
+    bands_of: B,
     visit: V,
 }
 
@@ -153,7 +158,7 @@ struct ByBand<'a, W, B, V> {
 impl<W, B, V> WithSimd for ByBand<'_, W, B, V>
 where
     W: Fn(u8, u8) -> bool,
-    B: Fn((Child, Child), f32) -> Option<usize>,
+    B: Fn(&Opened) -> [u32; LANES],
     V: FnMut(u32, u32, &mut Work) -> bool,
 {
     type Output = Option<usize>;
@@ -167,7 +172,7 @@ where
             turned,
             work,
             wanted,
-            band_of_pair,
+            bands_of,
             mut visit,
         } = self;
         let (body, obstacle) = trees;
@@ -179,6 +184,10 @@ where
                 band += 1;
                 continue;
             };
+            // Not before its turn: most that wait never have one.
+            if !wanted(body.owned(a), obstacle.owned(b)) {
+                continue;
+            }
             if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
                 work.triangle_pairs += 1;
                 if !visit(t, s, work) {
@@ -187,11 +196,12 @@ where
                 continue;
             }
             work.node_pairs += 1;
-            open(trees, volumes, turned, (a, b)).for_each(|(a, b), beyond| {
-                if wanted(body.owned(a), obstacle.owned(b))
-                    && let Some(own) = band_of_pair((a, b), beyond)
-                {
-                    room &= bands.push(own.max(band), (a, b));
+            let opened = open(trees, volumes, turned, (a, b));
+            let own = bands_of(&opened);
+            opened.for_each(|pair, lane| {
+                let own = own[lane] as usize;
+                if own < SIGNED_BANDS {
+                    room &= bands.push(own.max(band), pair);
                 }
             });
             if !room {
@@ -204,12 +214,12 @@ where
 
 /// The band of a signed share: what is deepest comes first, what is farthest last.
 #[inline]
-fn signed_band_of(share: f32) -> usize {
-    let band = band_of(share.abs()).min(BANDS - 1);
+fn signed_band_of(share: f32) -> u32 {
+    let band = band_of(share.abs());
     if share < 0.0 {
-        BANDS - 1 - band
+        BANDS as u32 - 1 - band
     } else {
-        BANDS + band
+        BANDS as u32 + band
     }
 }
 
@@ -227,10 +237,17 @@ pub(crate) fn for_deepest_triangle_pairs(
     let obstacle = trees.1;
     let scale = (1.0 / margin) as f32;
     let margin = margin as f32;
-    let band = |(_, b), beyond: f32| {
-        let short = (margin + beyond).max(0.0) + motions.least_along(obstacle, b) - target;
-        let out_of_question = short > 0.0; // false for NaN
-        (!out_of_question).then(|| signed_band_of(short * scale))
+    let bands_of = |opened: &Opened| {
+        let mut bands = [OUT_OF_QUESTION; LANES];
+        opened.for_each(|(_, b), lane| {
+            let gap = (margin + opened.beyond(lane)).max(0.0);
+            let short = gap + motions.least_along(obstacle, b) - target;
+            let out_of_question = short > 0.0; // false for NaN
+            if !out_of_question {
+                bands[lane] = signed_band_of(short * scale);
+            }
+        });
+        bands
     };
     volumes.processor.dispatch(ByBand {
         trees,
@@ -239,7 +256,7 @@ pub(crate) fn for_deepest_triangle_pairs(
         turned,
         work,
         wanted,
-        band_of_pair: band,
+        bands_of,
         visit,
     });
 }
@@ -273,7 +290,7 @@ mod tests {
         assert_eq!(edge(0, 2.0), 0.0);
         assert!(edge(BANDS, 2.0) < 2.0 && edge(BANDS, 2.0) > 1.9999);
         for share in [0.0, 1e-9, 1e-4, 0.1, 0.25, 0.499, 0.5, 0.99, -1.0, f32::NAN] {
-            let band = band_of(share);
+            let band = band_of(share) as usize;
             let d = f64::from(share.max(0.0)) * 2.0;
             assert!(edge(band, 2.0) <= d && band < BANDS, "{share}");
             assert!(

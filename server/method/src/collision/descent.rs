@@ -125,16 +125,32 @@ impl Opened {
         beyond: Beyond::NONE,
     };
 
-    /// Hands on the pairs that may come near, facing each other: with how much farther than the margin they are apart at least, m, not above zero.
+    /// By how much more than the margin a pair is apart at least, m; not above zero for those that may come near.
     #[inline(always)]
-    pub(super) fn for_each(&self, mut each: impl FnMut((Child, Child), f32)) {
+    pub(super) fn beyond(&self, lane: usize) -> f32 {
+        self.beyond.by.0[lane]
+    }
+
+    /// A value for each pair, from how much farther than the margin it is.
+    #[inline(always)]
+    pub(super) fn map(&self, value: impl Fn(f32) -> u32) -> [u32; LANES] {
+        let mut values = [0; LANES];
+        for (to, beyond) in values.iter_mut().zip(&self.beyond.by.0) {
+            *to = value(*beyond);
+        }
+        values
+    }
+
+    /// Hands on the pairs that may come near, facing each other, and their lanes.
+    #[inline(always)]
+    pub(super) fn for_each(&self, mut each: impl FnMut((Child, Child), usize)) {
         for_each_lane(self.beyond.near, |lane| {
             let child = self.first + lane;
             let pair = match self.side {
                 Side::Body => (child, self.other),
                 Side::Obstacle => (self.other, child),
             };
-            each(pair, self.beyond.by.0[lane as usize % LANES]);
+            each(pair, lane as usize % LANES);
         });
     }
 }
