@@ -21,7 +21,7 @@ pub struct Work {
 /// their sum's rough size matters: it is what a budget is held against, and it is the same on every machine.
 const NODE_PAIR_NS: u64 = 25;
 const TRIANGLE_PAIR_NS: u64 = 50;
-const FEATURE_PAIR_NS: u64 = 20;
+const FEATURE_PAIR_NS: u64 = 30;
 const ADVANCEMENT_STEP_NS: u64 = 150;
 const PROJECTION_NS: u64 = 1_000;
 

@@ -228,13 +228,13 @@ pub(super) fn for_contacts(
         work.feature_pairs += 1;
         facing.face_vertex(pair, k).map(&mut found);
     });
-    work.feature_pairs += u64::from(on_a.count_ones() * on_b.count_ones());
     if sides_a != 0 && sides_b != 0 {
         let of_body = facing.arcs_of_body(pair, sides_a);
         for_bits(sides_b, |j| {
             let on_obstacle = facing.arc_of_obstacle(pair, j);
             for_bits(sides_a, |i| {
                 if of_body[i].may_cross(&on_obstacle) {
+                    work.feature_pairs += 1;
                     facing.edge_edge(pair, i, j).map(&mut found);
                 }
             });
@@ -242,14 +242,17 @@ pub(super) fn for_contacts(
     }
     for_bits(corners_a, |i| {
         for_bits(sides_b, |j| {
+            work.feature_pairs += 1;
             facing.vertex_edge(pair, i, j).map(&mut found);
         });
         for_bits(corners_b, |j| {
+            work.feature_pairs += 1;
             facing.vertex_vertex(pair, i, j).map(&mut found);
         });
     });
     for_bits(corners_b, |j| {
         for_bits(sides_a, |i| {
+            work.feature_pairs += 1;
             facing.edge_vertex(pair, i, j).map(&mut found);
         });
     });
