@@ -4,11 +4,13 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes beside `path` under a name of its own, and takes the name when it is finished. Dropped before, it leaves nothing.
+/// Writes beside `path` under a name of its own, and takes the name when it is finished. Dropped before, it leaves nothing. What is there and is no
+/// file, such as `/dev/null` or a pipe, is written to as it is: nobody wants it replaced.
 #[derive(Debug)]
 pub(super) struct FinishedFile {
     path: PathBuf,
-    partial: PathBuf,
+    /// None where `path` is written to as it is.
+    partial: Option<PathBuf>,
     writer: Option<BufWriter<File>>,
 }
 
@@ -19,6 +21,14 @@ impl FinishedFile {
             let why = "`-` is no file here: the answer is renamed when it is whole, which standard output cannot be; name a file, such as ./out.csv";
             return Err(io::Error::new(io::ErrorKind::InvalidFilename, why));
         }
+        let is_special = |about: fs::Metadata| !about.is_file() && !about.is_dir();
+        if fs::metadata(path).is_ok_and(is_special) {
+            return Ok(Self {
+                path: path.to_path_buf(),
+                partial: None,
+                writer: Some(BufWriter::new(File::options().write(true).open(path)?)),
+            });
+        }
         let name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
         let mut partial_name = std::ffi::OsString::from(".");
         partial_name.push(name);
@@ -27,20 +37,20 @@ impl FinishedFile {
         let writer = Some(BufWriter::new(File::create(&partial)?));
         Ok(Self {
             path: path.to_path_buf(),
-            partial,
+            partial: Some(partial),
             writer,
         })
     }
 
     /// Gives the whole file its name.
     pub(super) fn finish(mut self) -> io::Result<()> {
-        if let Some(writer) = self.writer.take() {
-            writer
-                .into_inner()
-                .map_err(io::IntoInnerError::into_error)?
-                .sync_all()?;
-        }
-        fs::rename(&self.partial, &self.path)
+        let written = self.writer.take().map(BufWriter::into_inner).transpose();
+        let written = written.map_err(io::IntoInnerError::into_error)?;
+        let (Some(file), Some(partial)) = (written, &self.partial) else {
+            return Ok(());
+        };
+        file.sync_all()?;
+        fs::rename(partial, &self.path)
     }
 }
 
@@ -50,7 +60,9 @@ pub(super) fn replace(path: &Path, text: &str) -> io::Result<()> {
     let permissions = fs::metadata(&path)?.permissions();
     let mut file = FinishedFile::create(&path)?;
     file.write_all(text.as_bytes())?;
-    fs::set_permissions(&file.partial, permissions)?;
+    if let Some(partial) = &file.partial {
+        fs::set_permissions(partial, permissions)?;
+    }
     file.finish()
 }
 
@@ -70,7 +82,9 @@ impl Write for FinishedFile {
 impl Drop for FinishedFile {
     fn drop(&mut self) {
         // Finished, there is nothing to remove; otherwise a failure to remove has nobody left to be told to.
-        let _ = fs::remove_file(&self.partial);
+        if let Some(partial) = &self.partial {
+            let _ = fs::remove_file(partial);
+        }
     }
 }
 
@@ -82,6 +96,33 @@ mod tests {
     fn a_dash_is_refused_by_name() {
         let error = FinishedFile::create(Path::new("-")).map_err(|error| error.to_string());
         assert!(error.is_err_and(|error| error.contains("name a file")));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_written_to_and_stays_one() {
+        use std::os::unix::fs::FileTypeExt;
+        let Ok(directory) = tempfile::tempdir() else {
+            panic!("no temporary directory");
+        };
+        let path = directory.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&path).status();
+        assert!(made.is_ok_and(|status| status.success()));
+        let from = path.clone();
+        let reader = std::thread::spawn(move || fs::read(from));
+        let Ok(mut file) = FinishedFile::create(&path) else {
+            panic!("cannot write");
+        };
+        assert!(file.write_all(b"whole").is_ok());
+        assert!(file.finish().is_ok());
+        assert!(
+            reader
+                .join()
+                .is_ok_and(|read| read.is_ok_and(|bytes| bytes == b"whole"))
+        );
+        let about = fs::symlink_metadata(&path);
+        assert!(about.is_ok_and(|about| about.file_type().is_fifo()));
+        assert_eq!(fs::read_dir(directory.path()).map_or(0, Iterator::count), 1);
     }
 
     #[cfg(unix)]
