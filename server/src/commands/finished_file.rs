@@ -108,18 +108,18 @@ mod tests {
         let path = directory.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&path).status();
         assert!(made.is_ok_and(|status| status.success()));
-        let from = path.clone();
-        let reader = std::thread::spawn(move || fs::read(from));
+        let mut reader = std::process::Command::new("cat");
+        let reader = reader.arg(&path).stdout(std::process::Stdio::piped());
+        let Ok(reader) = reader.spawn() else {
+            panic!("nobody reads");
+        };
         let Ok(mut file) = FinishedFile::create(&path) else {
             panic!("cannot write");
         };
         assert!(file.write_all(b"whole").is_ok());
         assert!(file.finish().is_ok());
-        assert!(
-            reader
-                .join()
-                .is_ok_and(|read| read.is_ok_and(|bytes| bytes == b"whole"))
-        );
+        let read = reader.wait_with_output();
+        assert!(read.is_ok_and(|read| read.stdout == b"whole"));
         let about = fs::symlink_metadata(&path);
         assert!(about.is_ok_and(|about| about.file_type().is_fifo()));
         assert_eq!(fs::read_dir(directory.path()).map_or(0, Iterator::count), 1);
