@@ -8,7 +8,7 @@
 use arrayvec::ArrayVec;
 use nalgebra::Vector3;
 
-use super::carried::Carried;
+use super::carried::{Carried, row_of};
 use super::cone::MAX_CONE_CONTACTS;
 use crate::constraint::{ConstraintSet, FeaturePair};
 use crate::spatial::{Pose, Vector6, advance_pose, angular, pose_difference};
@@ -30,17 +30,7 @@ impl StickAnchor {
     /// Takes a new set in: its obstacles stand where they are there.
     pub(crate) fn arrive(&mut self, set: &ConstraintSet) {
         for (features, ahead) in &mut self.stuck {
-            let rows = &set.constraints;
-            let place = rows.binary_search_by_key(features, |row| row.features);
-            let near = |of: usize| {
-                rows.get(of)
-                    .filter(|row| row.features.obstacle == features.obstacle)
-            };
-            let row = place.map_or_else(
-                |next| near(next).or_else(|| near(next.wrapping_sub(1))),
-                |at| rows.get(at),
-            );
-            if let Some(row) = row {
+            if let Some(row) = row_of(&set.constraints, features) {
                 *ahead -= row.obstacle_displacement;
             }
         }

@@ -39,13 +39,33 @@ impl Carried<'_> {
         }
     }
 
-    /// Whether every obstacle stands.
-    pub(super) fn is_nothing(&self) -> bool {
-        match self {
-            Self::Share(share) => *share == 0.0,
-            Self::Since { stuck, .. } => stuck.is_empty(),
+    /// The longest of them, m; in the coupling that of the contacts that held the body, which tell for their obstacles.
+    pub(super) fn longest(&self, rows: &[NonPenetrationConstraint]) -> f64 {
+        let length = |row| self.of(row).norm();
+        match *self {
+            Self::Share(0.0) => 0.0,
+            Self::Share(_) => rows.iter().map(length).fold(0.0, f64::max),
+            Self::Since { stuck, .. } => {
+                let known = stuck.iter().filter_map(|(pair, _)| row_of(rows, pair));
+                known.map(length).fold(0.0, f64::max)
+            }
         }
     }
+}
+
+/// The row of these features, or else one of the same obstacle; rows ascend by features.
+pub(super) fn row_of<'a>(
+    rows: &'a [NonPenetrationConstraint],
+    features: &FeaturePair,
+) -> Option<&'a NonPenetrationConstraint> {
+    let place = rows.binary_search_by_key(features, |row| row.features);
+    let (at, before) = match place {
+        Ok(at) => (at, at),
+        Err(next) => (next, next.wrapping_sub(1)),
+    };
+    let of_obstacle = |row: &&NonPenetrationConstraint| row.features.obstacle == features.obstacle;
+    let near = |at: usize| rows.get(at).filter(of_obstacle);
+    near(at).or_else(|| near(before))
 }
 
 /// Of the same features, or else of the same obstacle.

@@ -71,11 +71,7 @@ pub struct FrictionProblem<'a> {
 impl FrictionProblem<'_> {
     /// Length in the metric of the farthest that an obstacle carries, m kg^(1/2).
     fn longest_carried(&self) -> f64 {
-        if self.carried.is_nothing() {
-            return 0.0;
-        }
-        let carried = self.constraints.iter().map(|row| self.carried.of(row));
-        let longest = carried.map(|way| way.norm()).fold(0.0, f64::max);
+        let longest = self.carried.longest(self.constraints);
         self.metric
             .norm(&six(&(Vector3::x() * longest), &Vector3::zeros()))
     }
