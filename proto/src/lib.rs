@@ -8,6 +8,32 @@
 //! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`], the light around them as
 //!   [`panorama::Panorama`].
 //!
+//! A datagram that is sealed opens once, and only with its bytes unchanged:
+//!
+//! ```
+//! use taut_proto::header::MAX_DATAGRAM_BYTES;
+//! use taut_proto::seal::{KEY_MATERIAL_BYTES, OpenError, Opener, Sealer};
+//! use taut_proto::{ForceSample, Payload};
+//!
+//! let (material, epoch, sender) = ([7; KEY_MATERIAL_BYTES], 1, 3); // a session agrees on them over QUIC
+//! let payload = Payload::Force(ForceSample {
+//!     sample_time_ns: 1_000_000,
+//!     clock_uncertainty_ns: 20_000,
+//!     index: 1,
+//!     wrench: [0.0, 0.0, 2.0, 0.0, 0.0, 0.0],
+//! });
+//! let mut buffer = [0; MAX_DATAGRAM_BYTES];
+//! let sealer = Sealer::new(&material, epoch, sender);
+//! let datagram = sealer.seal(&payload, &mut buffer).unwrap().to_vec();
+//!
+//! let mut opener = Opener::new(&material, epoch, sender);
+//! let mut changed = datagram.clone();
+//! changed[20] ^= 1;
+//! assert!(opener.open(&changed).is_err());
+//! assert_eq!(opener.open(&datagram).unwrap().payload, payload);
+//! assert!(matches!(opener.open(&datagram), Err(OpenError::Replayed)));
+//! ```
+//!
 //! Who may join is proven by [`proof`] with a secret from [`key`] or [`credential`]; what he may do then is in [`role`].
 //!
 //! Every byte goes through [`codec`]: little-endian, fixed size integers, explicit limits, no number that is not finite.

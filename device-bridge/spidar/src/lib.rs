@@ -15,6 +15,24 @@
 //! but for [`Geometry::parse`], which is given the text of a file. What runs in the loop ([`ForwardKinematics`],
 //! [`ResidualMonitor`], [`LengthRates`], [`TensionSolver`]) does not allocate and has named limits.
 //!
+//! From eight string lengths to the pose, and from a wrench to eight tensions:
+//!
+//! ```
+//! use nalgebra::Vector6;
+//! use taut_spidar::{ForwardKinematics, Geometry, Pose, TensionSettings, TensionSolver, TensionStatus};
+//!
+//! let geometry = Geometry::shipped("G6X4R").expect("a shipped device");
+//! let grip = Pose::translation(0.01, 0.0, -0.02);
+//! let answer = ForwardKinematics::new(&geometry).solve(&geometry.lengths(&grip)).unwrap();
+//! assert!((answer.frame_from_grip.translation.vector - grip.translation.vector).norm() < 1e-9);
+//!
+//! let wrench = Vector6::new(0.0, 0.0, 2.0, 0.0, 0.0, 0.0);
+//! let pulls = TensionSolver::new(&geometry, TensionSettings::default()).distribute(&answer.strings, &wrench);
+//! assert_eq!(pulls.status, TensionStatus::Rendered);
+//! assert!((pulls.wrench - wrench).norm() < 1e-3);
+//! assert!(pulls.tensions.iter().all(|t| (geometry.tension_min..=geometry.tension_max).contains(t)));
+//! ```
+//!
 //! Sources: Kim et al., VR 2002 (SPIDAR-G: eight strings, pose by Gauss-Newton, tensions by a bounded least-squares
 //! problem); Akahane and Sato (the active set of its driver). Where we depart from its driver, and why, is said in
 //! [`kinematics`] and [`tension`].
