@@ -236,15 +236,17 @@ pub fn execute(args: &BridgeArgs) -> ExitCode {
         }
     };
     if let Some(report) = report {
-        if args.json {
-            match serde_json::to_string_pretty(&report) {
-                Ok(text) => drop(console::report(text)),
-                Err(error) => {
-                    taut_log::say(&format!("the report cannot be written as JSON: {error}"));
-                }
-            }
+        let text = if args.json {
+            serde_json::to_string_pretty(&report).map_err(|error| error.to_string())
         } else {
-            console::report(report.to_string());
+            Ok(report.to_string())
+        };
+        let written = text.map(console::report).unwrap_or_else(|error| {
+            taut_log::say(&format!("the report cannot be written as JSON: {error}"));
+            false
+        });
+        if !written && code == ExitCode::SUCCESS {
+            return ExitCode::FAILURE;
         }
     }
     code

@@ -31,26 +31,36 @@ fn write_line(mut out: impl Write, mut text: String) -> io::Result<()> {
     out.write_all(text.as_bytes()).and_then(|()| out.flush())
 }
 
-/// Writes a report to standard output, and waits for that at most a second; whether it was written. For the end of a process, when
-/// there is no force any more.
+/// Writes a report to standard output, and waits for that at most a second: for the end of a process, when there is no force any more. False where it
+/// cannot be written (a full disk), which is said. A reader that has gone away, or that takes nothing, is no fault.
+#[must_use]
 pub fn report(text: impl Into<String>) -> bool {
-    written_in_time(io::stdout(), text.into())
+    match forgive_closed(written_in_time(io::stdout(), text.into())) {
+        Err(error) if error.kind() != io::ErrorKind::TimedOut => {
+            taut_log::say(&format!(
+                "taut: standard output cannot be written ({error}); check the free space"
+            ));
+            false
+        }
+        _ => true,
+    }
 }
 
-fn written_in_time(out: impl Write + Send + 'static, text: String) -> bool {
+fn written_in_time(out: impl Write + Send + 'static, text: String) -> io::Result<()> {
     let (progress, answer) = sync_channel(2);
     let thread = std::thread::Builder::new().name("report".to_owned());
-    let started = thread.spawn(move || write(out, text, &progress));
+    thread.spawn(move || write(out, text, &progress))?;
     // A busy machine may be slow to start the thread: that is no terminal's fault and does not count.
-    let begun = started.is_ok() && answer.recv().is_ok();
-    begun && answer.recv_timeout(REPORT_TIME).unwrap_or(false)
+    let _ = answer.recv();
+    answer
+        .recv_timeout(REPORT_TIME)
+        .unwrap_or(Err(io::ErrorKind::TimedOut.into()))
 }
 
-/// Sends when it begins, and whether all was taken.
-fn write(out: impl Write, text: String, progress: &SyncSender<bool>) {
-    let _ = progress.send(true);
-    let written = write_line(out, text);
-    let _ = progress.send(written.is_ok()); // who waited has given up
+/// Sends when it begins, and how the writing ended.
+fn write(out: impl Write, text: String, progress: &SyncSender<io::Result<()>>) {
+    let _ = progress.send(Ok(()));
+    let _ = progress.send(write_line(out, text)); // who waited has given up
 }
 
 #[cfg(test)]
@@ -62,7 +72,7 @@ mod tests {
     #[test]
     fn a_report_is_written_whole_and_ends_a_line() {
         let (mut reader, writer) = pipe().expect("a pipe");
-        assert!(written_in_time(writer, "all went well".to_owned()));
+        assert!(written_in_time(writer, "all went well".to_owned()).is_ok());
         let mut text = String::new();
         reader.read_to_string(&mut text).expect("text");
         assert_eq!(text, "all went well\n");
@@ -84,7 +94,8 @@ mod tests {
         let (_reader, writer) = pipe().expect("a pipe");
         let begun = Instant::now();
         // More than a pipe holds.
-        assert!(!written_in_time(writer, "x".repeat(1 << 20)));
+        let written = written_in_time(writer, "x".repeat(1 << 20));
+        assert!(written.is_err_and(|error| error.kind() == io::ErrorKind::TimedOut));
         let took = begun.elapsed();
         assert!(took >= REPORT_TIME, "{took:?}");
         // With what a busy machine adds.

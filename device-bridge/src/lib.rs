@@ -42,6 +42,8 @@ mod report;
 pub mod service_manager;
 pub mod signals;
 mod simulate;
+#[cfg(unix)]
+mod simulated_place;
 mod simulated_strings;
 #[cfg(unix)]
 pub mod spidar_uart;

@@ -13,6 +13,7 @@ use rustix::io::ioctl_fionbio;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 use crate::realtime::monotonic_now;
+use crate::simulated_place::make_room;
 
 /// How often a thread that waits looks for the end.
 const LOOK: Duration = Duration::from_millis(20);
@@ -33,7 +34,7 @@ pub struct PseudoTerminal<T> {
 }
 
 impl<T: FarEnd> PseudoTerminal<T> {
-    /// Opens a pseudo-terminal; `link` is a name for its path, replaced where there is one.
+    /// Opens a pseudo-terminal; `link` is a name for its path; that of a terminal that is gone is replaced.
     ///
     /// # Errors
     /// No pseudo-terminal, no thread, or the link cannot be made.
@@ -48,7 +49,7 @@ impl<T: FarEnd> PseudoTerminal<T> {
     pub fn start_shared(device: Arc<Mutex<T>>, link: Option<&Path>) -> std::io::Result<Self> {
         let (master, path) = open()?;
         if let Some(link) = link {
-            let _ = std::fs::remove_file(link); // most often there is none
+            make_room(link)?;
             std::os::unix::fs::symlink(&path, link)?;
         }
         let end = Arc::new(AtomicBool::new(false));

@@ -149,7 +149,7 @@ impl BridgeReport {
             ),
             (
                 self.safety_events > 0,
-                format!("{} safety events, in the log", self.safety_events),
+                format!("{} safety events (in the log at level info)", self.safety_events),
             ),
         ]
         .into_iter()

@@ -19,7 +19,7 @@ use signal_hook::flag;
 /// Sends SIGINT to a child that was not waited for yet.
 #[cfg(unix)]
 #[allow(unsafe_code, reason = "a system call")]
-pub(crate) fn interrupt(child: &std::process::Child) {
+pub fn interrupt(child: &std::process::Child) {
     let Ok(process) = libc::pid_t::try_from(child.id()) else {
         return; // no process has such a number
     };

@@ -199,10 +199,9 @@ enum PlayedReport {
 pub fn execute_simulation(args: &SimulateArgs) -> ExitCode {
     match play(args) {
         Ok(report) => {
-            if let Ok(text) = serde_json::to_string(&report) {
-                console::report(text);
-            }
-            ExitCode::SUCCESS
+            let text = serde_json::to_string(&report);
+            let is_written = text.is_ok_and(console::report);
+            ExitCode::from(u8::from(!is_written))
         }
         Err(error) => {
             taut_log::say(&format!("taut: {error}"));

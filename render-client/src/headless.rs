@@ -81,8 +81,10 @@ pub(crate) fn run(
 
         session.take_states(timeline);
         let now_ns = session.now_ns();
+        let released =
+            now_ns.and_then(|now_ns| Some((now_ns, pacer.next(now_ns, timeline.newest_ns())?)));
         if let Some((taken_ns, latched)) =
-            now_ns.and_then(|now_ns| Some((now_ns, pacer.next(now_ns, timeline.newest_ns())?)))
+            released.filter(|_| pacer.draws_at(next_frame, plan.frame_time))
         {
             canvas.set_status(pacer.complete(statistics.status(&plan.node, link)));
             canvas.draw(&latched, show, plan.out.is_some())?;
@@ -96,7 +98,7 @@ pub(crate) fn run(
                 return Ok(Ended::Frames);
             }
             last_drawn = None;
-            next_frame = Instant::now();
+            next_frame = (next_frame + plan.frame_time).max(Instant::now());
             continue; // the barrier keeps the rhythm
         }
 

@@ -23,8 +23,8 @@ fn main() -> ExitCode {
     taut_log::start("warn,taut_render=info");
     let code = match run(command_line.args) {
         Ok(report) => {
-            taut_bridge::console::report(report.to_string());
-            ExitCode::SUCCESS
+            let is_written = taut_bridge::console::report(report.to_string());
+            ExitCode::from(u8::from(!is_written))
         }
         Err(error) => {
             taut_log::say(&format!("error: {error}"));

@@ -94,6 +94,15 @@ impl Pacer {
         self.gate.lit(frame, lit);
     }
 
+    /// Whether the frame that [`Self::next`] answered is drawn by a node that has drawn up to `next_frame` and is to draw a frame each `frame_time`.
+    /// One that the others wait for draws every frame of the barrier; one that runs free keeps to its own rate, with one frame in hand, so
+    /// that jitter costs none.
+    pub(crate) fn draws_at(&self, next_frame: Instant, frame_time: Duration) -> bool {
+        let status = self.status();
+        let waited_for = status.synchronised && !status.late;
+        waited_for || next_frame.saturating_duration_since(Instant::now()) <= frame_time
+    }
+
     /// How this node stands among the others.
     fn status(&self) -> FrameStatus {
         self.gate.status()

@@ -344,16 +344,15 @@ impl App<'_> {
         let pacer = self
             .pacer
             .get_or_insert_with(|| Pacer::new(session, frame_time, display_ns));
-        let released = pacer.next(taken_ns, self.timeline.newest_ns());
+        let released = pacer
+            .next(taken_ns, self.timeline.newest_ns())
+            .filter(|_| pacer.draws_at(self.next_frame, frame_time));
         let locked = released.is_some();
         let now = Instant::now();
-        if locked {
-            self.next_frame = now; // the barrier keeps the rhythm
-        } else if now < self.next_frame {
-            return None;
-        } else {
-            self.next_frame = (self.next_frame + frame_time).max(now);
+        if !locked && now < self.next_frame {
+            return None; // where there is a barrier, that keeps the rhythm
         }
+        self.next_frame = (self.next_frame + frame_time).max(now);
         let latched = released.or_else(|| self.timeline.latch(taken_ns))?;
         let health = self.session.health();
         let drawn = (latched.state.time_ns, latched.stale, shown(health));

@@ -160,7 +160,15 @@ fn a_recording_that_was_changed_is_found_out() {
         Err(error) => panic!("{error}"),
     }
 
-    // An update that is missing.
+    // An update that is missing, of a recording that says that it is whole, and of one that does not: the last was killed, and its last line is cut.
+    let manifest = path.join("recording.json");
+    let say_complete = |is_complete: bool| {
+        replaced(&manifest, |text| {
+            let [from, to] = [!is_complete, is_complete].map(|c| format!("\"complete\": {c}"));
+            text.replace(&from, &to)
+        });
+    };
+    say_complete(true);
     replaced(&updates, |text| {
         text.lines()
             .enumerate()
@@ -171,6 +179,18 @@ fn a_recording_that_was_changed_is_found_out() {
     match again(&path) {
         Err(error) => assert!(error.to_string().contains("not whole"), "{error}"),
         Ok(report) => panic!("{report}"),
+    }
+    say_complete(false);
+    replaced(&path.join("forces.csv"), |text| {
+        text[..text.len() - 30].to_owned()
+    });
+    match again(&path) {
+        Ok(report) => {
+            assert!(report.updates <= 49, "{report}");
+            assert_eq!(report.first_difference, None);
+            assert!(report.gap.is_some_and(|gap| gap.contains("not whole")));
+        }
+        Err(error) => panic!("{error}"),
     }
 
     // Another stiffness.

@@ -120,7 +120,14 @@ fn run_loop(
         });
     };
     let first = first?;
-    let bridge = build(first.description())?;
+    let bridge = match build(first.description()) {
+        Ok(bridge) => bridge,
+        Err(error) => {
+            // Its name is free again at once.
+            runtime.block_on(first.leave());
+            return Err(error);
+        }
+    };
     let mut run = Run {
         safety: *bridge.port().settings(),
         wishes,

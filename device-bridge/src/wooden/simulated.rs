@@ -14,6 +14,7 @@ use super::kinematics::WoodenModel;
 use super::report::{BoardReport, HostReport};
 use crate::devices::held_arm::{HeldArm, led_through};
 use crate::realtime::monotonic_now;
+use crate::simulated_place::make_room;
 
 /// The firmware turns the motors off so long after the last report.
 const MOTORS_OFF: Duration = Duration::from_millis(500);
@@ -115,12 +116,12 @@ pub struct WoodenService {
 }
 
 impl WoodenService {
-    /// Answers at `path`, replaced where there is a socket already.
+    /// Answers at `path`; the socket of a board that is gone is replaced.
     ///
     /// # Errors
-    /// The socket or the thread cannot be had.
+    /// Something else is there, or the socket or the thread cannot be had.
     pub fn start(arm: Arc<Mutex<SimulatedWooden>>, path: &Path) -> std::io::Result<Self> {
-        let _ = std::fs::remove_file(path); // most often there is none
+        make_room(path)?;
         let socket = UnixDatagram::bind(path)?;
         socket.set_read_timeout(Some(LOOK))?;
         let end = Arc::new(AtomicBool::new(false));

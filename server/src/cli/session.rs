@@ -220,7 +220,7 @@ pub struct PushWrenchArgs {
     /// The force source's credential, or the cluster key; else TAUT_KEY_FILE names it
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
-    /// The same wrench all the time: force x,y,z in N, torque x,y,z in N m (default: each line of standard input is one, sent once)
+    /// The same wrench all the time: force x,y,z in N, torque x,y,z in N m (default: lines of standard input, of which the newest in each period is sent, once)
     #[arg(long, value_name = "FX,FY,FZ,TX,TY,TZ", value_parser = crate::commands::push_wrench::parse_wrench, allow_hyphen_values = true)]
     pub wrench: Option<[f64; 6]>,
     /// Name of this node, unique in the workbench

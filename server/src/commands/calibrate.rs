@@ -33,12 +33,12 @@ fn write_all(
     choice: &GpuChoice,
     folder: &Path,
 ) -> Result<Vec<String>, Failure> {
-    if !folder.is_dir() {
-        return Err(Failure::bad_input(format!(
-            "there is no folder {}; make it, or name another one with --out",
+    std::fs::create_dir_all(folder).map_err(|error| {
+        Failure::bad_input(format!(
+            "the folder {} cannot be made ({error}); name another one with --out",
             folder.display()
-        )));
-    }
+        ))
+    })?;
     let nodes = match &args.node {
         Some(node) => vec![node.as_str()],
         None => workbench

@@ -23,7 +23,7 @@ pub(super) fn run(args: &ExportArgs) -> Result<ExportReport, Failure> {
             args.out.display()
         ))
     };
-    let mut file = FinishedFile::create(&args.out).map_err(cannot_write)?;
+    let mut file = FinishedFile::create(&args.out, &[&args.recording]).map_err(cannot_write)?;
     let report =
         export_mcap(&recording, scene, &mut file, || interrupted.is_asked()).map_err(|error| {
             match error {

@@ -15,11 +15,15 @@ pub(super) struct FinishedFile {
 }
 
 impl FinishedFile {
-    /// Begins the file; the directory must be there.
-    pub(super) fn create(path: &Path) -> io::Result<Self> {
+    /// Begins the file; the directory must be there. It is none of the `inputs`, nor in a folder that is one: they would be lost.
+    pub(super) fn create(path: &Path, inputs: &[&Path]) -> io::Result<Self> {
         if path == Path::new("-") {
-            let why = "`-` is no file here: the answer is renamed when it is whole, which standard output cannot be; name a file, such as ./out.csv";
+            let why = "`-` is no file here: the answer is renamed when it is whole, which standard output cannot be; name a file, such as ./answer";
             return Err(io::Error::new(io::ErrorKind::InvalidFilename, why));
+        }
+        if inputs.iter().any(|input| is_in(path, input)) {
+            let why = "it is read for this answer, and would be lost; name another file";
+            return Err(io::Error::new(io::ErrorKind::AlreadyExists, why));
         }
         let is_special = |about: fs::Metadata| !about.is_file() && !about.is_dir();
         if fs::metadata(path).is_ok_and(is_special) {
@@ -54,11 +58,28 @@ impl FinishedFile {
     }
 }
 
+/// `path` leads to `input`, or into it where that is a folder.
+fn is_in(path: &Path, input: &Path) -> bool {
+    let Ok(input) = fs::canonicalize(input) else {
+        return false;
+    };
+    // What is not there yet is where its folder is.
+    let parent = || {
+        fs::canonicalize(
+            path.parent()
+                .filter(|p| *p != Path::new(""))
+                .unwrap_or(Path::new(".")),
+        )
+    };
+    let place = fs::canonicalize(path).or_else(|_| parent());
+    place.is_ok_and(|place| place.starts_with(input))
+}
+
 /// Puts a text in the place of what a file holds, with its permissions; whoever reads it finds the one or the other. A link stays one.
 pub(super) fn replace(path: &Path, text: &str) -> io::Result<()> {
     let path = fs::canonicalize(path)?;
     let permissions = fs::metadata(&path)?.permissions();
-    let mut file = FinishedFile::create(&path)?;
+    let mut file = FinishedFile::create(&path, &[])?;
     file.write_all(text.as_bytes())?;
     if let Some(partial) = &file.partial {
         fs::set_permissions(partial, permissions)?;
@@ -94,8 +115,27 @@ mod tests {
 
     #[test]
     fn a_dash_is_refused_by_name() {
-        let error = FinishedFile::create(Path::new("-")).map_err(|error| error.to_string());
+        let error = FinishedFile::create(Path::new("-"), &[]).map_err(|error| error.to_string());
         assert!(error.is_err_and(|error| error.contains("name a file")));
+    }
+
+    #[test]
+    fn what_is_read_for_the_answer_is_not_replaced() {
+        let Ok(directory) = tempfile::tempdir() else {
+            panic!("no temporary directory");
+        };
+        let [input, output] = ["trace.csv", "answer.csv"].map(|name| directory.path().join(name));
+        assert!(fs::write(&input, "precious").is_ok());
+        let kind = |path: &Path, input: &Path| {
+            let made = FinishedFile::create(path, &[Path::new("shipped-scene"), input]);
+            made.map_err(|error| error.kind()).map(|_| ())
+        };
+        assert_eq!(kind(&input, &input), Err(io::ErrorKind::AlreadyExists));
+        assert_eq!(
+            kind(&output, directory.path()),
+            Err(io::ErrorKind::AlreadyExists)
+        );
+        assert_eq!(kind(&output, &input), Ok(()));
     }
 
     #[cfg(unix)]
@@ -113,7 +153,7 @@ mod tests {
         let Ok(reader) = reader.spawn() else {
             panic!("nobody reads");
         };
-        let Ok(mut file) = FinishedFile::create(&path) else {
+        let Ok(mut file) = FinishedFile::create(&path, &[]) else {
             panic!("cannot write");
         };
         assert!(file.write_all(b"whole").is_ok());
@@ -156,7 +196,7 @@ mod tests {
         let path = directory.path().join("out.csv");
         let entries = || fs::read_dir(directory.path()).map_or(0, Iterator::count);
 
-        let Ok(mut dropped) = FinishedFile::create(&path) else {
+        let Ok(mut dropped) = FinishedFile::create(&path, &[]) else {
             panic!("cannot write");
         };
         assert!(dropped.write_all(b"half").is_ok());
@@ -164,7 +204,7 @@ mod tests {
         drop(dropped);
         assert_eq!(entries(), 0);
 
-        let Ok(mut finished) = FinishedFile::create(&path) else {
+        let Ok(mut finished) = FinishedFile::create(&path, &[]) else {
             panic!("cannot write");
         };
         assert!(finished.write_all(b"whole").is_ok());

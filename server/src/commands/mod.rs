@@ -139,14 +139,15 @@ fn end_session(
     json: bool,
     histogram: bool,
 ) -> Result<ExitCode> {
-    console::report(match (json, histogram) {
+    let printed = console::report(match (json, histogram) {
         (true, _) => as_json(&report)?,
         (false, true) => format!("{report}{}", report.histogram()),
         (false, false) => report.to_string(),
     });
     match failure {
         Some(failure) => Err(failure.into()),
-        None => Ok(ExitCode::SUCCESS),
+        None if printed => Ok(ExitCode::SUCCESS),
+        None => Ok(ExitCode::FAILURE),
     }
 }
 

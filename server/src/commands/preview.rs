@@ -120,7 +120,7 @@ pub(super) fn failure(error: RenderError) -> Failure {
 
 /// The whole file, or none.
 pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let written = FinishedFile::create(path).and_then(|mut file| {
+    let written = FinishedFile::create(path, &[]).and_then(|mut file| {
         file.write_all(bytes)?;
         file.finish()
     });

@@ -91,19 +91,20 @@ async fn send(
             }
             Some(Renewal::Ended(SessionEnd::ServerStopped)) => return (index, Ok(())),
         }
+        // A value without a time is felt by nobody: the clock is locked a tenth of a second after joining.
+        let Some(now) = link.session_now() else {
+            continue;
+        };
         match source.newest() {
             Ok(None) => {}
             Ok(Some(wrench)) => {
-                // A value without a time is felt by nobody: the clock is locked a tenth of a second after joining.
-                if let Some(now) = link.session_now() {
-                    index += 1;
-                    link.send_force(&ForceSample {
-                        sample_time_ns: now.ns,
-                        clock_uncertainty_ns: now.uncertainty_ns,
-                        index,
-                        wrench,
-                    });
-                }
+                index += 1;
+                link.send_force(&ForceSample {
+                    sample_time_ns: now.ns,
+                    clock_uncertainty_ns: now.uncertainty_ns,
+                    index,
+                    wrench,
+                });
             }
             Err(Over::Input) => return (index, Ok(())),
             Err(Over::Bad(text)) => return (index, Err(Failure::BadInput(text))),

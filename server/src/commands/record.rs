@@ -63,8 +63,9 @@ pub(super) async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         ))),
     };
     let (supervised, link, ()) = joined;
+    let inputs: Vec<&std::path::Path> = args.key.as_deref().into_iter().collect();
     let mut recorder = Recorder {
-        trace: TraceWriter::begin(FinishedFile::create(&args.out).map_err(cannot_write)?)
+        trace: TraceWriter::begin(FinishedFile::create(&args.out, &inputs).map_err(cannot_write)?)
             .map_err(cannot_write)?,
         scene: link.description().clone(),
         link,

@@ -24,8 +24,10 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), crate::shared::failure::Failur
     use crate::shared::failure::{EXIT_BAD_INPUT, Failure};
     match taut_render::run(args) {
         Ok(report) => {
-            taut_bridge::console::report(report.to_string());
-            Ok(())
+            let is_written = taut_bridge::console::report(report.to_string());
+            is_written
+                .then_some(())
+                .ok_or_else(|| Failure::failed("the report was not written"))
         }
         Err(error) if error.exit_code() == EXIT_BAD_INPUT => Err(Failure::bad_input(error)),
         Err(error) => Err(Failure::failed(error)),

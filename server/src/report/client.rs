@@ -8,6 +8,9 @@ use taut_link::Distribution;
 pub struct ClientReport {
     /// Its name in the workbench.
     pub node: String,
+    /// It is a render node; else a bridge.
+    #[serde(default)]
+    pub draws: bool,
     /// How poses reach it: `udp` or `quic`.
     pub transport: String,
     /// Frames drawn.

@@ -61,6 +61,8 @@ pub struct RecordedReport {
     pub different_forces: u64,
     /// What differed first.
     pub first_difference: Option<String>,
+    /// What is missing first of a recording that is not whole; nothing behind it was computed.
+    pub gap: Option<String>,
     /// Thread CPU time of one god-object update, here and now.
     pub update_us: Distribution,
     /// Thread CPU time of one force, here and now.
@@ -106,8 +108,11 @@ impl fmt::Display for RecordedReport {
             "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us",
             self.force_us.p50, self.force_us.p99, self.force_us.max
         )?;
-        match &self.first_difference {
-            Some(difference) => write!(f, "\nfirst difference    {difference}"),
+        if let Some(difference) = &self.first_difference {
+            write!(f, "\nfirst difference    {difference}")?;
+        }
+        match &self.gap {
+            Some(gap) => write!(f, "\nnot computed        from here on: {gap}"),
             None => Ok(()),
         }
     }

@@ -121,7 +121,10 @@ impl SessionReport {
             }
         }
         if self.safety_events > 0 {
-            faults.push(format!("{} safety events, in the log", self.safety_events));
+            faults.push(format!(
+                "{} safety events (in the log at level info)",
+                self.safety_events
+            ));
         }
         if faults.is_empty() {
             "verdict             good: deadlines kept, no penetration, no safety event".to_owned()
@@ -231,10 +234,15 @@ impl fmt::Display for SessionReport {
         )?;
         for client in &self.clients {
             if client.frames == 0 {
-                // A bridge, or a node that was gone before its first frame.
+                // A node may be gone before its first frame.
+                let what = if client.draws {
+                    "drew nothing"
+                } else {
+                    "bridge"
+                };
                 write!(
                     f,
-                    "\n{:<19} drew nothing, {} lost, by {}",
+                    "\n{:<19} {what}, {} lost, by {}",
                     client.node, client.packets_lost, client.transport
                 )?;
                 continue;

@@ -162,6 +162,9 @@ impl ClientLedger {
             return;
         };
         client.newest = stats.clone();
+        if stats.fps == 0.0 {
+            return; // a second without a frame has no ages
+        }
         client.pose_ages.follow(
             stats.pose_age_ms_p50,
             stats.pose_age_ms_p99,
@@ -220,6 +223,7 @@ impl ClientRecord {
         };
         ClientReport {
             node: self.node.clone(),
+            draws: self.role == Role::Render,
             transport: transport_name(self.transport).into(),
             frames,
             fps: f64::from(self.newest.fps),

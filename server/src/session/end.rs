@@ -42,7 +42,8 @@ impl Session {
         if let Some(recorder) = self.recorder.take() {
             let summary = recorder.finish();
             if let Some(error) = summary.failure {
-                terminal.say(&format!("taut: the recording is not whole: {error}"));
+                let sentence = format!("the recording is not whole: {error}");
+                failure = failure.or(Some(Failure::Failed(sentence)));
             } else if !summary.lost.is_none() {
                 terminal.say(&format!(
                     "taut: the recording is not whole: the disk was too slow, and records were lost ({})",

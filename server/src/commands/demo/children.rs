@@ -73,6 +73,14 @@ impl NamedChild {
         self.muted.store(true, Ordering::Relaxed);
     }
 
+    /// Asks it to end, as Ctrl-C does: one that is still joining hears nothing of a server that stops.
+    pub(super) fn interrupt(&mut self) {
+        if self.is_running() {
+            #[cfg(unix)]
+            taut_bridge::signals::interrupt(&self.process);
+        }
+    }
+
     /// Its exit status, the first time after it ended.
     pub(super) fn newly_ended(&mut self) -> Option<ExitStatus> {
         if self.ended.is_some() {

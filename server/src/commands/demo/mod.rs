@@ -141,15 +141,15 @@ pub(super) fn run(
         terminal.say("this program was built without drawing; the demo goes on without it");
     }
 
+    let mut early = Vec::new();
     watch(&mut session, args.duration, terminal, |_| {
         for child in &mut children {
             if let Some(status) = child.newly_ended()
                 && !status.success()
             {
-                terminal.say(&format!(
-                    "taut: {} ended early ({status}); the demo goes on without it",
-                    child.name()
-                ));
+                let what = format!("{} ended early ({status})", child.name());
+                terminal.say(&format!("taut: {what}; the demo goes on without it"));
+                early.push(what);
             }
         }
         true
@@ -157,8 +157,11 @@ pub(super) fn run(
     terminal.end_status();
     // One that is still joining would complain.
     children.iter().for_each(NamedChild::mute);
-    let ended = session.stop(terminal);
+    let (report, failure) = session.stop(terminal);
+    let early = (!early.is_empty()).then(|| Failure::Failed(early.join(", ")));
+    let ended = (report, failure.or(early));
     end.let_signals_kill();
+    children.iter_mut().for_each(NamedChild::interrupt);
     for name in wait_or_kill(children, GRACE) {
         terminal.say(&format!(
             "taut: {name} did not end by itself and was killed"

@@ -6,6 +6,7 @@
 pub mod recorded;
 
 use std::io::{self, IsTerminal};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -38,6 +39,7 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
             "a replay needs --scene, --trace and --out, or --recording",
         ));
     };
+    let inputs = [Path::new(scene), trace.as_path()];
     let scene = Scene::named_or_file(scene)?.with_overrides(&args.overrides)?;
     let trace = DeviceTrace::load(trace)?;
     let built = scene.build()?;
@@ -73,7 +75,7 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
             out.display()
         ))
     };
-    let file = FinishedFile::create(out).map_err(cannot_write)?;
+    let file = FinishedFile::create(out, &inputs).map_err(cannot_write)?;
     let mut writer = ReplayWriter::new(file, args.timings).map_err(cannot_write)?;
     write_answers(&mut replay, &trace, &mut writer, &interrupted).map_err(cannot_write)?;
     if interrupted.is_asked() {

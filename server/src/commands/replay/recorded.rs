@@ -41,7 +41,7 @@ pub fn run(
     };
     let mut writer = match out {
         Some(path) => Some(
-            FinishedFile::create(path)
+            FinishedFile::create(path, &[directory])
                 .and_then(|file| ReplayWriter::new(file, timings))
                 .map_err(|error| cannot_write(path, error))?,
         ),
@@ -101,6 +101,10 @@ struct RecordedSession {
     /// When the newest constraint set was published, s.
     published: f64,
     measured: Measured,
+    /// The recording says that nothing is missing.
+    is_whole: bool,
+    /// Of a recording that is not whole: what is missing first. Nothing behind it can be computed.
+    gap: Option<String>,
 }
 
 /// What was measured so far.
@@ -128,23 +132,36 @@ impl RecordedSession {
             forces: recording.forces().map_err(reader)?,
             published: 0.0,
             measured: Measured::default(),
+            is_whole: recording.manifest().complete,
+            gap: None,
         })
+    }
+
+    /// Ends the session here, which is bad input where the recording says that it is whole.
+    fn end_at<T>(&mut self, gap: String) -> Result<Option<T>, Failure> {
+        if self.is_whole {
+            return Err(Failure::BadInput(gap));
+        }
+        self.gap.get_or_insert(gap);
+        Ok(None)
     }
 
     /// The next force and the pose it belongs to; `None` at the end.
     fn next_force(&mut self) -> Result<Option<ReplayRow>, Failure> {
-        let Some(force) = self.forces.next_record().map_err(Failure::bad_input)? else {
-            return Ok(None);
+        let force = match self.forces.next_record() {
+            Ok(Some(force)) if self.gap.is_none() => force,
+            Ok(_) => return Ok(None),
+            Err(error) => return self.end_at(error.to_string()),
         };
         let mut update_us = 0.0;
         while self.god_object.constraint_set().sequence < force.constraint_sequence {
             match self.update()? {
                 Some(took) => update_us += took,
                 None => {
-                    return Err(Failure::BadInput(format!(
+                    return self.end_at(format!(
                         "forces.csv: force {} rests on constraint set {}, whose update is not in updates.csv; the recording is not whole",
                         force.sequence, force.constraint_sequence
-                    )));
+                    ));
                 }
             }
         }
@@ -195,9 +212,18 @@ impl RecordedSession {
 
     /// The next update; how long it took, us, and `None` at the end.
     fn update(&mut self) -> Result<Option<f64>, Failure> {
-        let Some(update) = self.updates.next_record().map_err(Failure::bad_input)? else {
-            return Ok(None);
+        let before = self.god_object.constraint_set().sequence;
+        let update = match self.updates.next_record() {
+            Ok(Some(update)) if self.gap.is_none() => update,
+            Ok(_) => return Ok(None),
+            Err(error) => return self.end_at(error.to_string()),
         };
+        if update.sequence != before + 1 {
+            return self.end_at(format!(
+                "updates.csv: update {} follows update {before}; the recording is not whole, and cannot be computed again from there",
+                update.sequence
+            ));
+        }
         self.god_object.set_device_ahead(update.device_ahead);
         for motion in &self.motions {
             let there = motion.pose_at(update.obstacle_time.as_secs_f64());
@@ -213,13 +239,6 @@ impl RecordedSession {
         self.measured.updates += 1;
         self.measured.update_us.push(took);
         let set = self.god_object.constraint_set();
-        if set.sequence != update.sequence {
-            return Err(Failure::BadInput(format!(
-                "updates.csv: update {} follows update {}; the recording is not whole, and cannot be computed again from there",
-                update.sequence,
-                set.sequence.saturating_sub(1)
-            )));
-        }
         let same = same_pose(&set.god_object_pose, &update.pose)
             && set.gap_min.to_bits() == update.gap_min.to_bits()
             && set.constraints.len() == update.contacts as usize;
@@ -251,6 +270,7 @@ impl RecordedSession {
             different_updates: measured.different_updates,
             different_forces: measured.different_forces,
             first_difference: measured.first_difference,
+            gap: self.gap,
             update_us: distribution_of(&measured.update_us),
             force_us: distribution_of(&measured.force_us),
         }
