@@ -229,6 +229,33 @@ fn a_body_between_plate_and_ceiling_stops_the_plate() {
 }
 
 #[test]
+fn a_plate_that_is_stopped_less_than_a_motion_short_of_its_target_has_arrived() {
+    let world = world(2e-3, 0.05);
+    let (mut god_object, _, settings) = loops(&world);
+    let device = Pose::translation(0.0, 0.0, 0.03);
+    let squeezed = (0..80).map(|update| {
+        let z = 1e-3 * f64::from(update);
+        god_object.move_obstacle(0, &Pose::translation(0.0, 0.0, z - 1e-3));
+        god_object.step(&device, None)
+    });
+    let squeezed = squeezed.last().expect("eighty updates");
+    assert_eq!(squeezed.obstacles_blocked, 1);
+    let stopped = *god_object.obstacle_poses().next().expect("a plate");
+    let further = 0.9 * settings.motion_tolerance;
+    god_object.move_obstacle(0, &(Pose::translation(0.0, 0.0, further) * stopped));
+    let report = god_object.step(&device, None);
+    assert_eq!(report.obstacles_blocked, 0);
+    // No room is looked for: one search, and those of the body's own motion.
+    assert!(
+        report.work.projections < squeezed.work.projections,
+        "{:?} {:?}",
+        report.work,
+        squeezed.work
+    );
+    assert!(!overlaps(&world, &god_object));
+}
+
+#[test]
 fn a_blade_that_turns_takes_the_body_along() {
     // A blade about the z axis that sweeps 20 degrees in each update.
     let world = Arc::new(World {

@@ -78,6 +78,15 @@ impl PlacedObstacle {
         pose_difference(&self.target, &self.pose, &Vector3::zeros())
     }
 
+    /// Bound on what its fastest point has left of its way, m.
+    fn way_left(&self) -> f64 {
+        if self.is_moving() {
+            self.length(&self.left())
+        } else {
+            0.0
+        }
+    }
+
     /// Bound on the path of its fastest point over a displacement, m.
     pub(super) fn length(&self, displacement: &Vector6) -> f64 {
         linear(displacement).norm() + self.radius * angular(displacement).norm()
@@ -156,6 +165,7 @@ impl GodObject {
             }
             return 0.0;
         }
+        let tolerance = self.settings.motion_tolerance;
         let mut share = 1.0;
         for _ in 0..MAX_ALTERNATIONS {
             let gone = self.advance_obstacles(share, report);
@@ -163,17 +173,20 @@ impl GodObject {
                 .settings
                 .work_budget
                 .is_none_or(|budget| report.work.nominal_us() < budget);
-            if self.longest_way_left() == 0.0 || share < LEAST_SHARE || !budget_left {
+            // An obstacle that lacks less than a motion has arrived: to look for room for so little costs a search each time.
+            let arrived = self.longest_way_left() <= tolerance;
+            if arrived || share < LEAST_SHARE || !budget_left {
                 break;
             }
-            let enough = (LEAST_PROGRESS * share * asked).max(self.settings.motion_tolerance);
+            let enough = (LEAST_PROGRESS * share * asked).max(tolerance);
             match self.make_room(share, report) {
                 Some(made) if made + gone > enough => share = (share / SQUEEZED_SHARE).min(1.0),
                 // No room; or none is needed at the end of a long turn, but on the way there.
                 _ => share *= SQUEEZED_SHARE,
             }
         }
-        let blocked = self.obstacles.iter().filter(|o| o.is_moving()).count();
+        let blocked = |o: &&PlacedObstacle| o.way_left() > tolerance;
+        let blocked = self.obstacles.iter().filter(blocked).count();
         report.obstacles_blocked = u32::try_from(blocked).unwrap_or(u32::MAX);
         let distance = self.settings.activation_distance;
         self.collect(distance, &mut report.work);
@@ -208,11 +221,8 @@ impl GodObject {
     }
 
     fn longest_way_left(&self) -> f64 {
-        self.obstacles
-            .iter()
-            .filter(|obstacle| obstacle.is_moving())
-            .map(|obstacle| obstacle.length(&obstacle.left()))
-            .fold(0.0, f64::max)
+        let ways = self.obstacles.iter().map(PlacedObstacle::way_left);
+        ways.fold(0.0, f64::max)
     }
 
     /// Every obstacle goes `share` of its way, as far as it is free of the body. The longest path made, m.
