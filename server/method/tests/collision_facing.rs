@@ -228,3 +228,24 @@ fn a_body_within_the_gap_at_the_start_keeps_what_there_is_and_slides() {
         assert!(kept >= 0.89 * at_start, "{kept:e} of {at_start:e}");
     }
 }
+
+#[test]
+fn plates_of_a_metre_that_slide_three_micrometres_apart_are_told_apart_by_their_volumes() {
+    let plate = mesh(grid_box([0.5, 0.5, 0.01], [100, 100, 1]));
+    let frame = Pose::new(Vector3::new(0.3, -0.2, 0.7), Vector3::new(0.4, 1.1, -0.6));
+    let above = frame * Pose::translation(1.7e-3, 0.9e-3, 0.02 + 3e-6);
+    let along = frame.rotation * Vector3::new(2e-3, 1e-3, 0.0);
+    let mut work = Work::default();
+    let found = time_of_impact(
+        &plate,
+        &straight(above, six(&along, &Vector3::zeros())),
+        &plate,
+        &frame,
+        &SETTINGS,
+        &mut CollisionWorkspace::new(),
+        &mut work,
+    );
+    assert_eq!(found, TimeOfImpact::Separated);
+    // Of the forty thousand triangles that lie on each other none is looked at.
+    assert!(work.triangle_pairs < 100, "{work:?}");
+}

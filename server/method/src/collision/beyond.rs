@@ -32,26 +32,34 @@ pub(super) struct OneToEight<'a> {
     pub(super) node: &'a WideNode,
 }
 
+impl OneToEight<'_> {
+    /// Centre of the one from the origin of the eight, m.
+    #[inline(always)]
+    pub(super) fn center(&self) -> [f32; 3] {
+        let coordinate = |i: usize| {
+            let between = self.turned.origin[i] - self.node.origin[i];
+            between + self.turned.origin_rest[i] + self.turned.center[i].0[self.lane % LANES]
+        };
+        [coordinate(0), coordinate(1), coordinate(2)]
+    }
+}
+
 /// By how much they are apart. NaN is passed over: what has no other bound is near.
 ///
 /// One loop over the lanes, without branches: the compiler makes vectors of it, of those that its caller was compiled for.
 #[inline(always)]
-pub(super) fn beyond(
-    &OneToEight {
+pub(super) fn beyond(pairs: &OneToEight) -> Beyond {
+    let &OneToEight {
         volumes,
         turned,
         lane,
         node,
-    }: &OneToEight,
-) -> Beyond {
+    } = pairs;
     let lane = lane % LANES;
     let one = |x: &Lanes| x.0[lane];
     let three = |v: &[Lanes; 3]| [one(&v[0]), one(&v[1]), one(&v[2])];
-    let (q_center, q_reach, q_axis) = (
-        three(&turned.center),
-        three(&turned.reach),
-        three(&turned.axis),
-    );
+    let q_center = pairs.center();
+    let (q_reach, q_axis) = (three(&turned.reach), three(&turned.axis));
     let (u, v) = (three(&turned.tangents[0]), three(&turned.tangents[1]));
     let (side_u, side_v) = (one(&turned.sides[0]), one(&turned.sides[1]));
     let (q_middle, q_slab) = (one(&turned.middle), one(&turned.slab));

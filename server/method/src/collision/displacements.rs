@@ -99,7 +99,7 @@ impl Motions {
     fn least_along_by_loop(&self, tree: &WideTree, child: Child) -> f32 {
         let (node, k) = (tree.node(child / LANES as u32), child as usize % LANES);
         let lane = |v: &[crate::geometry::lanes::Lanes; 3]| [v[0].0[k], v[1].0[k], v[2].0[k]];
-        let (center, axis) = (lane(&node.center), lane(&node.axis));
+        let (center, axis) = (sum(&node.origin, &lane(&node.center)), lane(&node.axis));
         let radius = node.radius.0[k];
         let [cos, sin] = self.turn;
         let (cosine, sine) = (

@@ -21,12 +21,15 @@
 //! is in front, and across the axis at most `g` times the sine of the cone aside: the tangents of a volume are axes of separation with a
 //! margin that is narrow where the surface is smooth.
 //!
-//! **Rounding.** Let L be the reach of both meshes about their origins, the distance of the origins and the path together. A
-//! coordinate of d comes with at most 10 u L (the rotation's rounding, its product and three sums), its product with a
-//! unit axis with 27 u L, the extents with 13 (cosine of the slabs), 26 (sides), 6 (axes and tangents that are unit and square
-//! only to rounding), 19 (sweep), 5 (what arms make of it) and 13 u L (the other middle), sums with 9 u L: less than 128 u L. The ends of
-//! a window come with 4 u of the distances and extents that they are quotients of, at most 5 L together, and with u of the path for each
-//! halving of the interval, at most 8: 160 u L in all, which the margin is widened by. Cosines come with less than 24 u, squares of chords with twice that.
+//! **Rounding** is relative to the volumes, not to the meshes: a gap of micrometres on a part of a metre is told from none. Centres are taken from the
+//! origins of their nodes, and how far these are apart is worked out in double precision. Let R be the radius of the volume that a node is below, and rho
+//! that of one of the eight or of the single volume. A centre that is turned comes with 12 u R; the sums that lead from it to the other with 4 u |d|, 4 u R
+//! of its own node and 6 u R of the other; the product of d with a unit axis with another 10 u |d|. Extents of the volume that is turned come with 31 (its
+//! axes), 9 (cosines), 7 (sums), 8 (axes and tangents that are unit and square only to rounding) and 10 u rho (middles); those of the other with less. The
+//! ends of a window come with 4 u of what they are quotients of, at most 8 u rho. Where a coordinate of d is more than twice the reach of both boxes, these
+//! are apart; otherwise |d| is at most 6 rho of the one and 4 rho of the other: 157 u rho and 16 u R in all. Each volume is built wider by 160 u rho
+//! and 16 u R on all its sides, and so along every axis ([`volume`](crate::geometry::volume)). What the motion adds comes with at most 160 u of its path,
+//! its turn's and the margin. Cosines come with less than 24 u, squares of chords with twice that.
 //!
 //! Source: Gottschalk, Lin, Manocha 1996 (separating axes); Larsson and Akenine-Moller 2009 (slab along a direction); the
 //! facing of cones as in normal-cone hierarchies, Johnson and Cohen 2001.
@@ -41,8 +44,9 @@ use crate::geometry::wide_tree::{Child, WideTree};
 
 /// Half a unit in the last place of 1 in single precision.
 const HALF_UNIT: f64 = 0.5 * f32::EPSILON as f64;
-/// Rounding of a separation relative to the reach L, and of a cosine: see the file's head.
+/// Rounding of what a motion and the margin add, relative to them; of coordinates in double precision; and of a cosine: see the file's head.
 const LENGTH_ROUNDING: f64 = 160.0 * HALF_UNIT;
+const DOUBLE_ROUNDING: f64 = 64.0 * f64::EPSILON;
 pub(super) const COSINE_ROUNDING: f32 = 24.0 * HALF_UNIT as f32;
 pub(super) const CHORD_ROUNDING: f32 = 2.0 * COSINE_ROUNDING;
 /// More than any length that a search may meet, m; squares of such lengths are finite in single precision.
@@ -85,8 +89,9 @@ pub(crate) struct FacingVolumes {
 pub(super) struct Frame {
     pub(super) rotation: [[f32; 3]; 3],
     pub(super) rotation_abs: [[f32; 3]; 3],
-    /// Origin of this tree from that of the other, other axes, m.
-    pub(super) offset: [f32; 3],
+    /// The same, and the origin of this tree from that of the other, other axes, m, in double precision: for the origins of nodes.
+    pub(super) turn: Matrix3<f64>,
+    pub(super) offset: Vector3<f64>,
     /// Half the path of the origin of the body's tree, m, half the rotation and its angle: other axes; zero for the obstacle, which rests.
     pub(super) half_path: [f32; 3],
     pub(super) half_turn: [f32; 3],
@@ -153,15 +158,17 @@ impl FacingVolumes {
         let angle = half_turn.norm();
         let path = half_path + half_turn.cross(&(origin - placement.center));
         let arm = (origin - placement.center).norm() + body.reach;
-        let reach = body.reach + obstacle.reach + offset.norm() + path.norm() + angle * body.reach;
+        let reach = body.reach + obstacle.reach + offset.norm();
         let curved = 0.5 * angle * angle * arm;
-        let bare_stray = curved + LENGTH_ROUNDING * reach;
+        let added = path.norm() + angle * body.reach + curved + margin;
+        let bare_stray = curved + LENGTH_ROUNDING * added + DOUBLE_ROUNDING * reach;
         let turn = (angle + widening).min(std::f64::consts::PI);
         let to_body = |v: &Vector3<f64>| vector(&rotation.tr_mul(v));
         let of_body = Frame {
             rotation: single(rotation),
             rotation_abs: single(&rotation.abs()),
-            offset: vector(&offset),
+            turn: *rotation,
+            offset,
             half_path: vector(&path),
             half_turn: vector(&half_turn),
             angle: angle as f32,
@@ -171,7 +178,8 @@ impl FacingVolumes {
         let of_obstacle = Frame {
             rotation: single(&rotation.transpose()),
             rotation_abs: single(&rotation.abs().transpose()),
-            offset: to_body(&-offset),
+            turn: rotation.transpose(),
+            offset: rotation.tr_mul(&-offset),
             half_path: [0.0; 3],
             half_turn: [0.0; 3],
             angle: 0.0,

@@ -3,6 +3,7 @@
 //! A descent meets the same volumes again and again, each time against other ones. So a node is turned once for all its eight, and kept until
 //! another takes its place.
 
+use nalgebra::Vector3;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::facing_volumes::{FacingVolumes, Side};
@@ -18,6 +19,9 @@ const FOOT_SHARE: f32 = 2e-4;
 /// Eight volumes in the frame of the other tree. The axes point the other way: the product with an axis that they face is 1.
 #[derive(Clone, Debug)]
 pub(super) struct Turned {
+    /// The node's origin, what is left of it where single precision ends, and the centres from there, m.
+    pub(super) origin: [f32; 3],
+    pub(super) origin_rest: [f32; 3],
     pub(super) center: [Lanes; 3],
     /// Half of the sides of the boxes along the frame's axes, and what points stray by along them, m.
     pub(super) reach: [Lanes; 3],
@@ -131,6 +135,8 @@ impl Turned {
     const fn zero() -> Self {
         let zero = Lanes::splat(0.0);
         Self {
+            origin: [0.0; 3],
+            origin_rest: [0.0; 3],
             center: [zero; 3],
             reach: [zero; 3],
             axis: [zero; 3],
@@ -156,10 +162,16 @@ impl Turned {
     fn turn<const MOVES: bool>(&mut self, volumes: &FacingVolumes, side: Side, node: &WideNode) {
         let frame = volumes.frame(side);
         let (n, rotation) = (node, &frame.rotation);
+        let origin = frame.turn * Vector3::from(n.origin).map(f64::from);
+        let arm_of_origin: [f32; 3] = origin.map(|x| x as f32).into();
+        let origin = origin + frame.offset;
+        let rounded = origin.map(|x| x as f32);
+        self.origin_rest = (origin - rounded.map(f64::from)).map(|x| x as f32).into();
+        self.origin = rounded.into();
         for k in 0..LANES {
             let lane = |v: &[Lanes; 3]| [v[0].0[k], v[1].0[k], v[2].0[k]];
             let (own_axis, own_tangent) = (lane(&n.axis), lane(&n.tangent));
-            let arm = apply(rotation, &lane(&n.center));
+            let center = apply(rotation, &lane(&n.center));
             let (axis, tangent) = (apply(rotation, &own_axis), apply(rotation, &own_tangent));
             let bitangent = product(&axis, &tangent);
             let (along, across) = (n.along.0[k], n.across.0[k]);
@@ -174,7 +186,7 @@ impl Turned {
                     tangent[i].abs().mul_add(along, bitangent[i].abs() * across),
                 );
                 let half = if half[i] < aslant { half[i] } else { aslant };
-                self.center[i].0[k] = arm[i] + frame.offset[i];
+                self.center[i].0[k] = center[i];
                 self.reach[i].0[k] = half + volumes.stray + turning;
                 self.axis[i].0[k] = -axis[i];
                 self.tangents[0][i].0[k] = tangent[i];
@@ -191,6 +203,7 @@ impl Turned {
             if !MOVES {
                 continue;
             }
+            let arm = sum(&arm_of_origin, &center);
             let sweep = sum(&frame.half_path, &product(&frame.half_turn, &arm));
             for i in 0..3 {
                 self.sweep[i].0[k] = sweep[i];

@@ -83,22 +83,20 @@ impl Windows {
 /// One loop over the lanes, without branches: the compiler makes vectors of it, of those that its caller was compiled for.
 #[inline(always)]
 pub(super) fn windows<const THE_ONE_MOVES: bool, const TIMED: bool>(
-    &OneToEight {
+    pairs: &OneToEight,
+    window: Window,
+) -> Windows {
+    let &OneToEight {
         volumes,
         turned,
         lane,
         node,
-    }: &OneToEight,
-    window: Window,
-) -> Windows {
+    } = pairs;
     let lane = lane % LANES;
     let one = |x: &Lanes| x.0[lane];
     let three = |v: &[Lanes; 3]| [one(&v[0]), one(&v[1]), one(&v[2])];
-    let (q_center, q_reach, q_axis) = (
-        three(&turned.center),
-        three(&turned.reach),
-        three(&turned.axis),
-    );
+    let q_center = pairs.center();
+    let (q_reach, q_axis) = (three(&turned.reach), three(&turned.axis));
     let (u, v) = (three(&turned.tangents[0]), three(&turned.tangents[1]));
     let (side_u, side_v) = (one(&turned.sides[0]), one(&turned.sides[1]));
     let (q_middle, q_slab) = (one(&turned.middle), one(&turned.slab));
@@ -110,6 +108,7 @@ pub(super) fn windows<const THE_ONE_MOVES: bool, const TIMED: bool>(
     );
     // The eight are the body's, seen in its own axes; or the one is.
     let (path, spin, angle) = volumes.path_in_body_axes();
+    let path = sum(path, &product(spin, &node.origin));
     let stray = volumes.stray;
 
     let n = node;
@@ -131,7 +130,7 @@ pub(super) fn windows<const THE_ONE_MOVES: bool, const TIMED: bool>(
             turning = 0.0;
             stray_a = stray + chord.mul_add(q_turning, q_stray_axis);
         } else {
-            let sweep = sum(path, &product(spin, &c));
+            let sweep = sum(&path, &product(spin, &c));
             s = [-sweep[0], -sweep[1], -sweep[2]];
             turning = angle * n.radius.0[k];
             let along_axis = dot(spin, &b)

@@ -2,7 +2,7 @@
 //!
 //! | symbol | name in code  | unit | meaning                                                                       |
 //! |--------|---------------|------|-------------------------------------------------------------------------------|
-//! | c      | `center`      | m    | centre of the box, from the tree's `origin`, mesh axes                        |
+//! | c      | `center`      | m    | centre of the box, from the node's `origin`, mesh axes                        |
 //! | a      | `axis`        | –    | mean normal of the triangles inside, unit to rounding                         |
 //! | t      | `tangent`     | –    | across a, unit to rounding; b = a x t                                         |
 //! | m, h   | `middle`, `slab` | m | `a.(p - c)` is in [m - h, m + h] for every point p inside                     |
@@ -14,9 +14,11 @@
 //! by slabs long before they are by boxes. Seen along a unit direction n, the points reach over
 //! `m a.n +- (h |a.n| + d |t.n| + e |b.n|)`: exactly as far as they do, for a rectangle that is seen aslant.
 //!
-//! **Rounding.** All is relative to the middle of the mesh, so that a mesh far from its frame's origin loses nothing. The
+//! **Rounding.** All is relative to the middle of the volume above, so that a small volume loses nothing on a large mesh. The
 //! centre and the axes are what single precision holds; half sides, slab, radius and angle are measured from them in double
-//! precision and rounded outward by `OUTWARD`, more than one unit in the last place of either precision.
+//! precision and rounded outward by `OUTWARD`, more than one unit in the last place of either precision. The boxes are wider than what is inside by what a
+//! test of two volumes in single precision may lose (`SEPARATION_ROUNDING`, `CENTER_ROUNDING`; `collision/facing_volumes.rs` says why that is enough), so
+//! that it is not worked out for each pair.
 
 use nalgebra::{Point3, Vector2, Vector3};
 
@@ -27,6 +29,10 @@ use super::tree::Node;
 /// Outward rounding of a length relative to it and to the coordinates that it is the difference of.
 const OUTWARD: f64 = f32::EPSILON as f64;
 const OUTWARD_DOUBLE: f64 = 8.0 * f64::EPSILON;
+/// By how much the boxes are wider than their contents, per radius, and per radius of the volume above: 160 and 16 half units in the last place of single
+/// precision.
+const SEPARATION_ROUNDING: f64 = 80.0 * f32::EPSILON as f64;
+const CENTER_ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
 /// Cones are wider than computed by this, rad: the rounding of an arc tangent, and then some.
 const CONE_ROUNDING: f64 = 1e-7;
 /// A rectangle may be larger by this share than that along the longest way, to lie as the strip does that it is of.
@@ -68,15 +74,16 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// What node `index` of the binary tree holds, measured triangle by triangle; `above` is the tangent of a volume that holds this one.
-    pub(super) fn volume(&self, index: u32, above: Option<&[f32; 3]>) -> Volume {
+    /// What node `index` of the binary tree holds, measured triangle by triangle, in a node with this origin below the volume `above`.
+    pub(super) fn volume(&self, index: u32, above: Option<&Volume>, origin: &[f32; 3]) -> Volume {
         let node = &self.binary[index as usize];
         let [from, to] = self.ranges[index as usize];
         let inside = &self.order[from as usize..to as usize];
-        let center = (node.center - self.origin).map(|x| x as f32);
+        let origin = self.origin + Vector3::from(*origin).map(f64::from);
+        let center = (node.center - origin).map(|x| x as f32);
         let axis = self.mean_normal(inside).map(|x| x as f32);
-        let (wide_center, wide_axis) = (self.origin + center.map(f64::from), axis.map(f64::from));
-        let tangent = self.tangent(inside, &wide_center, &wide_axis, above);
+        let (wide_center, wide_axis) = (origin + center.map(f64::from), axis.map(f64::from));
+        let tangent = self.tangent(inside, &wide_center, &wide_axis, above.map(|v| &v.tangent));
         let wide_tangent = tangent.map(f64::from);
         let [along, across] = self.sides(inside, &wide_center, &wide_axis, &wide_tangent);
 
@@ -101,20 +108,24 @@ impl Source<'_> {
         }
         // Coordinates are exact in the mesh's frame; their differences are rounded relative to them.
         let error = OUTWARD_DOUBLE * (self.origin.coords.amax() + wide_center.coords.amax());
+        let around = above.map_or(0.0, |volume| f64::from(volume.radius));
         let outward = |length: f64| (length * (1.0 + 2.0 * OUTWARD) + error) as f32;
+        let radius = radius.sqrt();
+        let lost = SEPARATION_ROUNDING * radius + CENTER_ROUNDING * around;
+        let wider = |length: f64| outward(length + lost);
         let middle = (0.5 * (low + high)) as f32;
         let slab = (high - f64::from(middle)).max(f64::from(middle) - low);
         let angle = angle.min(std::f64::consts::PI);
         Volume {
             center: center.into(),
-            half: half.map(outward).into(),
+            half: half.map(wider).into(),
             axis: axis.into(),
             tangent: tangent.into(),
             middle,
-            slab: outward(slab + OUTWARD_DOUBLE * radius.sqrt()),
-            along: outward(along),
-            across: outward(across),
-            radius: outward(radius.sqrt()),
+            slab: wider(slab + OUTWARD_DOUBLE * radius),
+            along: wider(along),
+            across: wider(across),
+            radius: outward(radius),
             cosine: angle.cos() as f32,
             sine: angle.sin() as f32,
             owned: inside

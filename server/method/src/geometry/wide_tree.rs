@@ -23,6 +23,8 @@ pub(crate) const ROOT: Child = 0;
 /// Eight children, a lane each. Lanes without a child have boxes that meet nothing.
 #[derive(Clone, Debug)]
 pub(crate) struct WideNode {
+    /// The point from which its children's centres are taken, from the tree's origin, m: about the middle of them.
+    pub(crate) origin: [f32; 3],
     pub(crate) center: [Lanes; 3],
     pub(crate) half: [Lanes; 3],
     pub(crate) axis: [Lanes; 3],
@@ -61,7 +63,7 @@ pub(crate) struct WideTree {
     nodes: Vec<WideNode>,
     /// What a descent asks of the children of all nodes, by number.
     entries: Vec<Entry>,
-    /// Point of the mesh's frame from which all coordinates are taken, m.
+    /// Point of the mesh's frame from which the nodes' origins are taken, m.
     pub(crate) origin: Point3<f64>,
     /// Largest distance of a vertex from `origin`, m.
     pub(crate) reach: f64,
@@ -116,18 +118,19 @@ impl WideTree {
             origin: source.origin,
             reach,
         };
-        tree.add_node();
-        let whole = source.volume(0, None);
+        let middle = [0.0; 3];
+        tree.add_node(middle);
+        let whole = source.volume(0, None, &middle);
         tree.set(ROOT, whole);
-        let below = source.grow(0, &whole.tangent, &mut tree);
+        let below = source.grow(0, &whole, &middle, &mut tree);
         tree.entries[ROOT as usize].below = below;
         tree
     }
 
     /// Appends a node without children; its number.
-    fn add_node(&mut self) -> u32 {
+    fn add_node(&mut self, origin: [f32; 3]) -> u32 {
         let index = self.nodes.len() as u32;
-        self.nodes.push(WideNode::empty());
+        self.nodes.push(WideNode::empty(origin));
         self.entries
             .resize(self.nodes.len() * LANES, Entry::default());
         index
@@ -180,9 +183,10 @@ impl WideTree {
 }
 
 impl WideNode {
-    fn empty() -> Self {
+    fn empty(origin: [f32; 3]) -> Self {
         let zero = Lanes::splat(0.0);
         Self {
+            origin,
             center: [zero; 3],
             half: [Lanes::splat(f32::NEG_INFINITY); 3],
             axis: [zero; 3],
@@ -235,18 +239,19 @@ impl WideNode {
 }
 
 impl Source<'_> {
-    /// Appends what lies below node `top` of the binary tree; says what it is.
-    fn grow(&self, top: u32, tangent: &[f32; 3], tree: &mut WideTree) -> u32 {
+    /// Appends what lies below node `top` of the binary tree, whose volume is `above` in a node with this origin; says what it is.
+    fn grow(&self, top: u32, above: &Volume, origin: &[f32; 3], tree: &mut WideTree) -> u32 {
         let node = &self.binary[top as usize];
         if node.is_leaf() {
             return node.triangle | TRIANGLE;
         }
         let (below, count) = self.collapse.open(top);
-        let index = tree.add_node();
+        let middle = [0, 1, 2].map(|i| origin[i] + above.center[i]);
+        let index = tree.add_node(middle);
         for (child, opened) in (index * LANES as u32..).zip(&below[..count]) {
-            let volume = self.volume(*opened, Some(tangent));
+            let volume = self.volume(*opened, Some(above), &middle);
             tree.set(child, volume);
-            tree.entries[child as usize].below = self.grow(*opened, &volume.tangent, tree);
+            tree.entries[child as usize].below = self.grow(*opened, &volume, &middle, tree);
         }
         index
     }
@@ -296,11 +301,11 @@ mod tests {
                 .flat_map(|c| below(mesh, c))
                 .collect(),
         };
-        let v = tree
-            .node(child / LANES as u32)
-            .child(child as usize % LANES);
+        let node = tree.node(child / LANES as u32);
+        let v = node.child(child as usize % LANES);
         let wide = |x: [f32; 3]| Vector3::from(x.map(f64::from));
-        let (center, axis) = (tree.origin + wide(v.center), wide(v.axis));
+        let center = tree.origin + wide(node.origin) + wide(v.center);
+        let axis = wide(v.axis);
         let cone = f64::from(v.sine).atan2(f64::from(v.cosine));
         for t in &triangles {
             for p in mesh.corners(*t) {
