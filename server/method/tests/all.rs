@@ -25,6 +25,7 @@ mod god_object_peg_in_hole;
 mod implicit_constraints;
 mod mesh_impact;
 mod moving_friction;
+mod moving_friction_variants;
 mod moving_half_spaces;
 mod moving_obstacles;
 mod no_alloc_steps;
