@@ -78,8 +78,9 @@ pub(crate) fn uniform(state: &mut u64) -> f64 {
     ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// A seed for the draws of one run.
-pub(crate) fn seed(recipe: &Recipe, method: Method, tuning: Tuning, rate: u32, phase: u32) -> u64 {
+/// A seed for the draws of a run from one start phase: other phases, other draws.
+#[must_use]
+pub fn seed(recipe: &Recipe, method: Method, tuning: Tuning, rate: u32, phase: f64) -> u64 {
     let name = format!("{} {phase}", key(recipe, method, tuning, rate));
     let bytes = blake3::hash(name.as_bytes());
     let (head, _) = bytes.as_bytes().split_first_chunk().expect("32 bytes");

@@ -7,6 +7,17 @@ use crate::measure::{Measure, Measures};
 use crate::method::{HapticMethod, Method, Tuning};
 use crate::recipe::Recipe;
 
+/// Start phases that tunings are chosen from, in periods. None of them is [`judged`]: 3 (2 k + 1) is odd, 2 n and 4 n
+/// are even.
+pub const TRAINING: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
+
+/// The `count` start phases that a recipe is judged from: the middles of as many parts of a period, (2 k + 1) / (2 n).
+#[must_use]
+pub fn judged(count: u32) -> Vec<f64> {
+    let phases = (0..count).map(|k| (f64::from(k) + 0.5) / f64::from(count));
+    phases.collect()
+}
+
 /// Median and 99th percentile of CPU times, us.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Times {
@@ -46,18 +57,18 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Runs a recipe at a rate, Hz, from `count` phases, each with a method that `start` gives. Without a `payer`, or where its costs
+    /// Runs a recipe at a rate, Hz, from start phases, each with a method that `start` gives. Without a `payer`, or where its costs
     /// are not known, every update takes its whole period.
     pub fn of(
         recipe: &Recipe,
         rate: u32,
-        count: u32,
+        phases: &[f64],
         payer: Option<Payer>,
         start: impl Fn() -> Box<dyn HapticMethod>,
     ) -> Self {
         let (mut updates, mut forces) = (Vec::new(), Vec::new());
         let cost = payer.and_then(|by| costs::of(recipe, by.method, by.tuning, rate));
-        let charge = |phase: u32| match (payer, cost) {
+        let charge = |phase: f64| match (payer, cost) {
             (Some(by), Some(cost)) => {
                 let seed = costs::seed(recipe, by.method, by.tuning, rate, phase);
                 Charge::Drawn(cost, seed)
@@ -65,10 +76,11 @@ impl Measured {
             _ => Charge::WholePeriod,
         };
         let (mut charged, mut spanned) = (0.0, 0.0);
-        let phases = (0..count)
-            .map(|k| {
-                let phase = (f64::from(k) + 0.5) / f64::from(count);
-                let run = clock::run(start().as_mut(), recipe, rate, phase, &mut charge(k));
+        let phases = phases
+            .iter()
+            .map(|phase| {
+                let charge = &mut charge(*phase);
+                let run = clock::run(start().as_mut(), recipe, rate, *phase, charge);
                 charged += run.charged;
                 spanned += run.spanned;
                 updates.extend(run.update_us);

@@ -2,7 +2,7 @@
 
 use crate::clock::RATES;
 use crate::measure::{Measure, Measures};
-use crate::measured::{Load, Measured, Payer, Times};
+use crate::measured::{Load, Measured, Payer, TRAINING, Times, judged};
 use crate::method::{Method, Tuning};
 use crate::recipe::{Ideal, Line, Recipe};
 use crate::reference::{FORCE_ERROR, TORQUE_ERROR};
@@ -34,7 +34,7 @@ pub struct Outcome {
     pub load: Load,
 }
 
-/// A tuning that was tried, from one start phase.
+/// A tuning that was tried, from the phases for [`TRAINING`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
     /// With what.
@@ -46,8 +46,8 @@ pub struct Trial {
 }
 
 impl Outcome {
-    /// Runs a recipe with the best of the method's tunings: that which is felt least from one start phase, and of these the one that
-    /// misses the fewest lines.
+    /// Runs a recipe with the best of the method's tunings: that which is felt least from the phases for [`TRAINING`], and of these the one
+    /// that misses the fewest lines.
     #[must_use]
     pub fn of(recipe: &Recipe, method: Method, rate: u32) -> Self {
         let tunings = method.tunings();
@@ -55,7 +55,7 @@ impl Outcome {
             [_] => Vec::new(),
             several => several
                 .iter()
-                .map(|tuning| Self::from_phases(recipe, method, rate, *tuning, 1))
+                .map(|tuning| Self::from_phases(recipe, method, rate, *tuning, &TRAINING))
                 .collect(),
         };
         let trial = |tried: &Self| Trial {
@@ -69,10 +69,7 @@ impl Outcome {
             .iter()
             .min_by(|a, b| a.felt.total_cmp(&b.felt).then(a.missed.cmp(&b.missed)))
             .map_or(tunings[0], |trial| trial.tuning);
-        // A recipe of one phase was run whole when it was tried.
-        let whole = tried.into_iter().find(|tried| tried.tuning == best);
-        let whole = whole.filter(|_| recipe.phases == 1);
-        let mut outcome = whole.unwrap_or_else(|| Self::tuned(recipe, method, rate, best));
+        let mut outcome = Self::tuned(recipe, method, rate, best);
         outcome.trials = trials;
         outcome
     }
@@ -80,14 +77,20 @@ impl Outcome {
     /// Runs a recipe with this tuning.
     #[must_use]
     pub fn tuned(recipe: &Recipe, method: Method, rate: u32, tuning: Tuning) -> Self {
-        Self::from_phases(recipe, method, rate, tuning, recipe.phases)
+        Self::from_phases(recipe, method, rate, tuning, &judged(recipe.phases))
     }
 
-    fn from_phases(recipe: &Recipe, method: Method, rate: u32, tuning: Tuning, count: u32) -> Self {
+    fn from_phases(
+        recipe: &Recipe,
+        method: Method,
+        rate: u32,
+        tuning: Tuning,
+        phases: &[f64],
+    ) -> Self {
         let period = 1.0 / f64::from(rate);
         let start = || method.start(&recipe.scene, period, tuning);
         let payer = Some(Payer { method, tuning });
-        let measured = Measured::of(recipe, rate, count, payer, start);
+        let measured = Measured::of(recipe, rate, phases, payer, start);
         Self::judged(recipe, method, rate, tuning, measured)
     }
 

@@ -1,8 +1,9 @@
 //! The laboratory on the quick extent of its recipes: this project's method passes, and the failures of others are seen.
 
 use taut_lab::clock::RATES;
+use taut_lab::costs::seed;
 use taut_lab::measure::{Measure, Measures};
-use taut_lab::measured::Measured;
+use taut_lab::measured::{Measured, Payer, TRAINING, judged};
 use taut_lab::method::{Method, Tuning};
 use taut_lab::outcome::{Outcome, reference_rows};
 use taut_lab::recipe::{Ideal, Recipe};
@@ -172,7 +173,7 @@ fn r11_the_paper_is_late_by_what_its_delays_add_up_to() {
         let period = 1.0 / f64::from(rate);
         let start = || Method::Paper.start(&recipe.scene, period, Tuning::Default);
         // Its loop has no time to spare: nobody pays, and each update takes its whole period.
-        let measured = Measured::of(&recipe, rate, recipe.phases, None, start);
+        let measured = Measured::of(&recipe, rate, &judged(recipe.phases), None, start);
         let depths = measured
             .phases
             .iter()
@@ -204,6 +205,31 @@ fn r09_discrete_detection_pops_through_the_thinner_plate() {
     let through = |phase: &&Measures| phase.get(Measure::Astray) > 0.01;
     let popped = discrete.phases.iter().filter(through).count();
     assert!(popped < discrete.phases.len(), "{popped}");
+}
+
+/// Neither the phases nor the draws of costs that a tuning is chosen from are among those that it is judged on.
+#[test]
+fn no_method_is_tuned_on_what_it_is_judged_on() {
+    for recipe in all(Extent::Full).iter().chain(&all(Extent::Quick)) {
+        for phase in judged(recipe.phases) {
+            for training in TRAINING {
+                assert_ne!(phase, training, "{recipe:?}");
+                let seed = |phase| seed(recipe, Method::Paper, Tuning::Default, 300, phase);
+                assert_ne!(seed(phase), seed(training), "{recipe:?}");
+            }
+        }
+    }
+    let recipe = recipe("R02", "ball on a plane");
+    for method in Method::ALL {
+        for trial in Outcome::of(&recipe, method, 300).trials {
+            let tuning = trial.tuning;
+            let start = || method.start(&recipe.scene, 1.0 / 300.0, tuning);
+            let payer = Some(Payer { method, tuning });
+            let measured = Measured::of(&recipe, 300, &TRAINING, payer, start);
+            let felt = measured.worst(Measure::JndP95);
+            assert_eq!(trial.felt, felt, "{method:?}, {tuning}");
+        }
+    }
 }
 
 /// The best of a grid is what the table shows: no tuning that was tried is felt less.

@@ -14,6 +14,7 @@ use crate::chart::colour;
 use crate::clock::{self, Charge};
 use crate::costs;
 use crate::measure::Measure;
+use crate::measured::judged;
 use crate::method::Method;
 use crate::outcome::Outcome;
 use crate::plot::PANEL;
@@ -126,10 +127,10 @@ pub(crate) fn run(recipes: &[Recipe], outcomes: &[Outcome]) -> Vec<Trace> {
         for outcome in its {
             let period = 1.0 / f64::from(window.rate);
             let mut method = outcome.method.start(&recipe.scene, period, outcome.tuning);
-            let begin = (phase as f64 + 0.5) / outcome.phases.len() as f64;
+            let begin = judged(recipe.phases)[phase];
             let (by, with, rate) = (outcome.method, outcome.tuning, window.rate);
             let cost = costs::of(recipe, by, with, rate);
-            let seed = costs::seed(recipe, by, with, rate, phase as u32);
+            let seed = costs::seed(recipe, by, with, rate, begin);
             let mut charge = cost.map_or(Charge::WholePeriod, |cost| Charge::Drawn(cost, seed));
             let run = clock::run(method.as_mut(), recipe, rate, begin, &mut charge);
             traces.push(Trace {

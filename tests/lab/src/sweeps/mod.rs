@@ -22,7 +22,7 @@ pub(crate) use files::{legend, panels};
 
 use crate::crew;
 use crate::measure::Measure;
-use crate::measured::Measured;
+use crate::measured::{Measured, judged};
 use crate::methods::GodObjectMethod;
 use crate::recipe::Recipe;
 use crate::recipes::Extent;
@@ -225,7 +225,7 @@ fn run(recipe: &Recipe, rate: u32, settings: &Settings, store: &Store) -> Measur
     let key = format!("sweep {} {rate} {settings:?}", recipe_key(recipe));
     store.get(recipe.name, &key, Measured::from_numbers, || {
         let start = || Box::new(GodObjectMethod::new(&recipe.scene, settings)) as _;
-        let measured = Measured::of(recipe, rate, recipe.phases, None, start);
+        let measured = Measured::of(recipe, rate, &judged(recipe.phases), None, start);
         let numbers = Measured::to_numbers(&measured.phases, &measured.times, &measured.load);
         (measured, numbers)
     })
