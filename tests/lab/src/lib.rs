@@ -14,6 +14,7 @@
 //! - [`costs`]: what updates cost, from a committed table; [`felt`]: the error in what people feel, millisecond by millisecond.
 //! - [`crew`]: work side by side; [`run`]: all of it, with progress; [`page`]: the report as one HTML file; [`provenance`]: on what it was made.
 //! - [`row`]: the one type of row that tables and files are made of.
+//! - [`papers`]: each opponent on a scene of its own paper.
 //! - [`replay`]: measured contact forces of a person's hand, and what each method renders for the same motion.
 //! - [`fidelity`]: is what a scene chooses for itself the cheapest that is good enough?
 //! - [`score`]: the headline; [`report`]: table and CSV; [`chart`]: error against time, recipe by recipe; [`overview`]: all of them in one picture.
@@ -36,6 +37,7 @@ pub mod methods;
 pub mod outcome;
 pub mod overview;
 pub mod page;
+pub mod papers;
 mod plot;
 pub mod provenance;
 pub mod recipe;

@@ -12,6 +12,7 @@ use std::process::ExitCode;
 
 use taut_lab::crew;
 use taut_lab::method::Method;
+use taut_lab::papers;
 use taut_lab::recipes::Extent;
 use taut_lab::replay;
 use taut_lab::report;
@@ -50,6 +51,10 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
     }
     if std::env::args().nth(1).as_deref() == Some("--measure") {
         return measure(std::env::args().nth(2));
+    }
+    if std::env::args().nth(1).as_deref() == Some("papers") {
+        print!("{}", papers::table(&papers::figures()));
+        return Ok(ExitCode::SUCCESS);
     }
     if std::env::args().nth(1).as_deref() == Some("measured") {
         return measured(std::env::args().nth(2));
@@ -124,10 +129,12 @@ taut-lab [report] [OPTION...] [RECIPE...]
 taut-lab fidelity [--quick] [--held-out] [--out DIRECTORY]
 taut-lab --measure [FILE]
 taut-lab measured [FILE]
+taut-lab papers
 
   report           adds all sweeps and maps, and writes report.html, a page of everything
   fidelity         what the choice of a scene's settings costs, beside every setting
   measured         replays measured contact forces through every method (tests/data/measured)
+  papers           each opponent on a scene of its own paper, beside what is published
   --measure        makes the table of costs anew (tests/lab/data/costs.csv): on a quiet machine
   --quick          a part of the cases
   --held-out       of fidelity: the twelve scenes whose predictions were written down before they were run; --predict prints these

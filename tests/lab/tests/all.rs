@@ -4,5 +4,6 @@
 mod fidelity;
 mod identical;
 mod measured_forces;
+mod papers;
 mod quick;
 mod report;

@@ -30,7 +30,7 @@ pub(crate) fn ball(radius: f64) -> Body {
 }
 
 /// A cube of 1 kg.
-pub(super) fn cube(half: f64) -> Body {
+pub(crate) fn cube(half: f64) -> Body {
     body(cube_mesh(half))
 }
 
@@ -40,7 +40,7 @@ pub(super) fn cube_mesh(half: f64) -> Mesh {
 }
 
 /// A box along the axes between two corners.
-pub(super) fn block(name: &str, low: Point3<f64>, high: Point3<f64>) -> Obstacle {
+pub(crate) fn block(name: &str, low: Point3<f64>, high: Point3<f64>) -> Obstacle {
     let (half, middle) = ((high - low) * 0.5, nalgebra::center(&low, &high));
     let pose = Pose::translation(middle.x, middle.y, middle.z);
     obstacle(name, mesh(cuboid([half.x, half.y, half.z])), pose)

@@ -16,6 +16,8 @@ use crate::row::Row;
 
 /// Which mesh: that of 5,000 triangles, so that every method at every rate is done within an hour.
 const FILE: &str = "bunny_5k.ply";
+/// That of the paper.
+const LARGE: &str = "bunny_27k.ply";
 const SIZE: f64 = 0.15;
 /// Where the held one is at the start and when it is pressed, m above the other: their centres.
 const APART: f64 = 0.2;
@@ -37,11 +39,18 @@ pub(super) fn unavailable(extent: Extent) -> Vec<Row> {
 }
 
 pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
-    let file = data_file(FILE).filter(|_| extent == Extent::Full);
-    let Some(file) = file else {
-        return Vec::new();
-    };
-    let raw = read_mesh(&file).unwrap_or_else(|error| panic!("{error}"));
+    let full = (extent == Extent::Full).then(|| recipe(FILE));
+    full.flatten().into_iter().collect()
+}
+
+/// With the mesh of the paper; `None` where it is not there.
+pub(crate) fn large() -> Option<Recipe> {
+    recipe(LARGE)
+}
+
+fn recipe(file: &str) -> Option<Recipe> {
+    let raw = read_mesh(&data_file(file)?).unwrap_or_else(|error| panic!("{error}"));
+    let thousands = (raw.triangles.len() + 500) / 1000;
     let bunny = mesh(raw);
     let world = World {
         body: body(bunny.clone()),
@@ -60,9 +69,12 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         )
     };
     let scene = Scene::new(world, SIZE, 0.27, device(0.0));
-    let case = ("R27", "bunny on bunny, 5,000 triangles each".to_owned());
+    let case = (
+        "R27",
+        format!("bunny on bunny, {thousands},000 triangles each"),
+    );
     let about = "free forms: approach, slide, press, twist";
-    vec![Recipe {
+    Some(Recipe {
         ideal: Ideal::Reference,
         lines: Box::new(|_| {
             let mut lines = sound();
@@ -72,5 +84,5 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         check_every: 10,
         out_of_scope: turns,
         ..Recipe::new(case, about, scene, 1.8, device)
-    }]
+    })
 }

@@ -29,7 +29,8 @@ mod texture;
 mod thin_plate;
 mod wrong_side;
 
-pub(crate) use bodies::{ball, force, ground};
+pub(crate) use bodies::{ball, block, cube, force, ground};
+pub(crate) use bunny::large as large_bunnies;
 pub(crate) use oracles::SolverName;
 pub(crate) use oracles::many_contacts::random_contacts;
 

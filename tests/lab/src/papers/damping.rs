@@ -1,0 +1,64 @@
+//! How much damping a device needs so that nothing can be got out of a method.
+//!
+//! | symbol | unit  | meaning                                              |
+//! |--------|-------|------------------------------------------------------|
+//! | K, B   | N/m, N s/m | spring and damper between the hand and what it touches |
+//! | T      | s     | time between forces: `TICK`                          |
+//! | b      | N s/m | damping of the device                                |
+//!
+//! Source: Colgate and Schenkel 1997, "Passivity of a class of sampled-data systems": b > T / 2 Re((1 - exp(-j w T)) H) / (1 - cos w T) at all
+//! frequencies. For H = K + B (z - 1) / (T z) that is b > K T / 2 - B cos w T, at worst K T / 2 + |B|.
+
+use std::f64::consts::TAU;
+
+use god_object::World;
+use god_object::spatial::linear;
+
+use super::{HALF, at, driven};
+use crate::clock::TICK;
+use crate::method::{Method, Scene, Tuning};
+use crate::recipes::{ball, ground};
+
+/// Half the swing of the device, m.
+const SWING: f64 = 1e-4;
+/// Ticks on the way to the middle of the swing and until the method has settled there, and ticks of the swing: the last half counts.
+const SETTLED: u32 = 400;
+const SWINGS: u32 = 256;
+
+/// A ball above a wall.
+pub(super) fn wall() -> Scene {
+    let world = World {
+        body: ball(HALF),
+        obstacles: vec![ground()],
+    };
+    Scene::new(world, 2.0 * HALF, 0.1, at(HALF + 1e-4))
+}
+
+/// K T / 2, N s/m.
+pub(super) fn of_spring() -> f64 {
+    0.5 * wall().stiffness() * TICK
+}
+
+/// The damping, N s/m, that takes as much as comes out of a method. The device swings about a depth in the wall, m, once in so many ticks, at
+/// constant speed between samples: of all motions with these samples the one that a damper takes least of.
+pub(super) fn needed(method: Method, tuning: Tuning, depth: f64, swing: u32) -> f64 {
+    let height = |tick: u32| {
+        let down = depth * (f64::from(2 * tick) / f64::from(SETTLED)).min(1.0);
+        let turn = TAU * f64::from(tick % swing) / f64::from(swing);
+        let swung = if tick < SETTLED {
+            0.0
+        } else {
+            SWING * turn.cos()
+        };
+        HALF - down + swung
+    };
+    let mut method = method.start(&wall(), TICK, tuning);
+    let run = driven(method.as_mut(), SETTLED + SWINGS, |tick| at(height(tick)));
+    let (mut given, mut taken) = (0.0, 0.0);
+    for tick in SETTLED + SWINGS / 2..SETTLED + SWINGS {
+        let way = height(tick + 1) - height(tick);
+        given += linear(&run[tick as usize].1).z * way;
+        taken += way * way / TICK;
+    }
+    given / taken
+}
