@@ -14,7 +14,7 @@ use crate::method::Scene;
 use crate::recipe::{Ideal, Line, Recipe};
 use crate::row::Row;
 
-/// Which mesh: that of 5,000 triangles, so that every method at every rate is done within an hour.
+/// Of 5,000 triangles.
 const FILE: &str = "bunny_5k.ply";
 /// That of the paper.
 const LARGE: &str = "bunny_27k.ply";
@@ -39,8 +39,8 @@ pub(super) fn unavailable(extent: Extent) -> Vec<Row> {
 }
 
 pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
-    let full = (extent == Extent::Full).then(|| recipe(FILE));
-    full.flatten().into_iter().collect()
+    let files = [FILE, LARGE].iter().filter(|_| extent == Extent::Full);
+    files.filter_map(|file| recipe(file)).collect()
 }
 
 /// With the mesh of the paper; `None` where it is not there.
