@@ -60,7 +60,7 @@ impl Outcome {
         };
         let trial = |tried: &Self| Trial {
             tuning: tried.tuning,
-            missed: tried.missed(recipe),
+            missed: tried.missed(recipe).len(),
             felt: tried.worst(Measure::JndP95),
         };
         let trials: Vec<Trial> = tried.iter().map(trial).collect();
@@ -204,18 +204,22 @@ impl Outcome {
         )
     }
 
-    fn missed(&self, recipe: &Recipe) -> usize {
+    /// Names of the lines and probes that it missed.
+    #[must_use]
+    pub fn missed(&self, recipe: &Recipe) -> Vec<&'static str> {
+        let lines = self.lines.iter().filter(|(_, passes)| !passes);
         let probes = recipe.probes.iter().enumerate().filter(|(index, probe)| {
             let passes = self.worst_probe(*index) <= (probe.limit)(self.rate); // false for NaN
             !passes
         });
-        self.lines.iter().filter(|(_, passes)| !passes).count() + probes.count()
+        let lines = lines.map(|(line, _)| line.measure.key());
+        lines.chain(probes.map(|(_, probe)| probe.key)).collect()
     }
 
     /// Whether every line and every probe is passed.
     #[must_use]
     pub fn passes(&self, recipe: &Recipe) -> bool {
-        self.missed(recipe) == 0
+        self.missed(recipe).is_empty()
     }
 
     /// A row for every measure and probe. What this project's method is known not to keep is open, not failed.

@@ -1,6 +1,6 @@
 //! The headline: of the cases that every compared method can run, how many are within the budget, and which are not.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::method::Method;
 use crate::outcome::Outcome;
@@ -18,28 +18,46 @@ pub struct Score {
     pub rate: u32,
     /// Fewest updates a second that were held in a case, Hz.
     pub held: f64,
-    /// Each case, and whether every line of every variant is kept.
-    pub cases: BTreeMap<Case, bool>,
+    /// Each case, and the lines that some variant of it missed.
+    pub cases: BTreeMap<Case, BTreeSet<&'static str>>,
 }
 
 impl Score {
     /// How many cases are within the budget.
     #[must_use]
     pub fn within(&self) -> usize {
-        self.cases.values().filter(|within| **within).count()
+        self.cases
+            .values()
+            .filter(|missed| missed.is_empty())
+            .count()
     }
 
-    /// `n of m common cases within the budget`, and those that are not by name.
+    /// Each line that was missed, and in how many cases; the one that most missed comes first.
+    #[must_use]
+    pub fn reasons(&self) -> Vec<(&'static str, usize)> {
+        let mut reasons = BTreeMap::new();
+        for line in self.cases.values().flatten() {
+            *reasons.entry(*line).or_insert(0) += 1;
+        }
+        let mut reasons: Vec<_> = reasons.into_iter().collect();
+        reasons.sort_by_key(|(_, cases)| std::cmp::Reverse(*cases)); // stable: by name
+        reasons
+    }
+
+    /// `n of m common cases within the budget`, the lines that were missed, and the cases that are not by name.
     #[must_use]
     pub fn headline(&self) -> String {
         let outside: Vec<String> = (self.cases.iter())
-            .filter(|(_, within)| !**within)
+            .filter(|(_, missed)| !missed.is_empty())
             .map(|((name, case), _)| format!("{name} {case}"))
             .collect();
         let outside = if outside.is_empty() {
             String::new()
         } else {
-            format!("; outside: {}", outside.join("; "))
+            let reasons = self.reasons();
+            let reasons: Vec<_> = reasons.iter().map(|(l, n)| format!("{l} {n}")).collect();
+            let (reasons, outside) = (reasons.join(", "), outside.join("; "));
+            format!("; lines missed, and in how many cases: {reasons}; outside: {outside}")
         };
         format!(
             "{}, {} Hz asked, at least {:.0} Hz held: {} of {} common cases within the budget{outside}",
@@ -81,7 +99,8 @@ pub fn scores(recipes: &[&Recipe], outcomes: &[Outcome], methods: &[Method]) -> 
         });
         let score = &mut scores[index];
         score.held = score.held.min(outcome.load.held);
-        *score.cases.entry(case).or_insert(true) &= outcome.passes(recipe);
+        let missed = score.cases.entry(case).or_default();
+        missed.extend(outcome.missed(recipe));
     }
     scores
 }

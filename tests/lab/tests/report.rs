@@ -141,6 +141,11 @@ fn a_trace_shows_the_fall_through_the_plate() {
         "{ours} N, not {right} N"
     );
     assert!(discrete.abs() < 0.1 * right, "{discrete} N: it is through");
+    // And the headline names the line that it misses.
+    let its =
+        |score: &&taut_lab::score::Score| score.method == Method::Discrete && score.rate == 70;
+    let score = results.scores.iter().find(its).expect("it was run");
+    assert!(score.headline().contains("astray"), "{}", score.headline());
     let page = text(&folder.path().join("report.html"));
     for section in ["matrix", "predicted", "traces", "scope", "reading"] {
         assert!(page.contains(&format!("id={section}>")), "{section}");
