@@ -1,7 +1,7 @@
 //! Each opponent on a scene of its own paper: what is published, and what it comes to here. `taut-lab papers` prints the table.
 //!
-//! Unless a recipe is named, a loop has time to spare: an update and a force every millisecond, both of the pose of then. What no source that
-//! could be read says stands in [`NOT_ESTABLISHED`].
+//! Unless a recipe is named, a loop has time to spare: an update and a force every millisecond, both of the pose of then. The last rows of the
+//! table say what no source that could be read establishes.
 
 mod as_published;
 mod damping;
