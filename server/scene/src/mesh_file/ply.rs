@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use super::read::finite_vertex;
+use super::read::{finite_vertex, is_blank};
 use super::{Fault, RawMesh};
 
 /// Longest header, bytes.
@@ -100,6 +100,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
                 }
             }
         }
+    }
+    if !is_blank(source.rest()) {
+        let text =
+            "has more after the last element than its header promises; export the file again";
+        return Err(Fault {
+            line: source.current_line(),
+            text: text.to_owned(),
+        });
     }
     let count = mesh.vertices.len();
     for (number, triangle) in mesh.triangles.iter().enumerate() {
@@ -371,6 +379,12 @@ enum Source<'b> {
 }
 
 impl Source<'_> {
+    fn rest(&self) -> &[u8] {
+        match self {
+            Self::Text { rest, .. } | Self::Binary { rest, .. } => rest,
+        }
+    }
+
     fn current_line(&self) -> Option<usize> {
         match self {
             Self::Text { line, .. } => Some(*line),
@@ -539,6 +553,16 @@ mod tests {
         let whole = write_ply(&parse(TEXT.as_bytes()).unwrap());
         let fault = parse(&whole[..whole.len() - 5]).unwrap_err();
         assert_eq!(fault.text, "is cut off in face 1 of 2; copy the file again");
+    }
+
+    #[test]
+    fn rows_beyond_those_that_are_promised_are_named() {
+        let text =
+            "has more after the last element than its header promises; export the file again";
+        let fault = parse((TEXT.to_owned() + "3 0 1 2\n").as_bytes()).unwrap_err();
+        assert_eq!(fault, Fault::at(17, text));
+        let whole = write_ply(&parse((TEXT.to_owned() + "\n\n").as_bytes()).unwrap());
+        assert_eq!(parse(&[whole, vec![3]].concat()).unwrap_err().text, text);
     }
 
     #[test]

@@ -127,6 +127,11 @@ pub(crate) fn finite_vertex(
     }
 }
 
+/// Whether these bytes hold nothing: padding that some programs write behind the last element.
+pub(super) fn is_blank(bytes: &[u8]) -> bool {
+    bytes.iter().all(|b| *b == 0 || b.is_ascii_whitespace())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

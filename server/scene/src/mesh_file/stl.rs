@@ -1,8 +1,9 @@
 //! STL, binary and text, by the crate `stl_io`; corners are welded where their coordinates are exactly equal.
 
+use std::borrow::Cow;
 use std::io::Cursor;
 
-use super::read::finite_vertex;
+use super::read::{finite_vertex, is_blank};
 use super::{Fault, RawMesh};
 
 /// Bytes before the first triangle of a binary file, and bytes per triangle.
@@ -10,6 +11,68 @@ const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
+    let mut mesh = RawMesh::default();
+    if is_text(bytes) {
+        for solid in solids(bytes)? {
+            append(solid.as_bytes(), &mut mesh)?;
+        }
+    } else {
+        let mut bytes = Cow::from(bytes);
+        if bytes.starts_with(b"solid") {
+            bytes.to_mut()[0] = b' '; // the crate would take it for a text
+        }
+        append(&bytes, &mut mesh)?;
+        let whole = HEADER_BYTES + mesh.triangles.len() * TRIANGLE_BYTES;
+        let rest = bytes.get(whole..).unwrap_or_default();
+        if !is_blank(rest) {
+            return Err(Fault::new(format!(
+                "is too long: {} triangles are promised, but {} bytes follow them; export the file again",
+                mesh.triangles.len(),
+                rest.len()
+            )));
+        }
+    }
+    Ok(mesh.welded())
+}
+
+/// Whether the file begins as a text does. A binary file may do so, too, but its count of triangles has a byte of 0.
+fn is_text(bytes: &[u8]) -> bool {
+    let after = bytes.trim_ascii_start().strip_prefix(b"solid");
+    after.is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_whitespace))
+        && !bytes.contains(&0)
+}
+
+/// The solids of a text, each for itself and without its name: the crate reads to the first `endsolid`.
+fn solids(bytes: &[u8]) -> Result<Vec<String>, Fault> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut solids: Vec<String> = Vec::new();
+    let mut open: Option<String> = None;
+    for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
+        let Some(word) = line.split_whitespace().next() else {
+            continue;
+        };
+        match (word, &mut open) {
+            ("solid", None) => open = Some("solid \n".to_owned()),
+            ("endsolid", Some(solid)) => {
+                solid.push_str("endsolid\n");
+                solids.extend(open.take());
+            }
+            (_, Some(solid)) => {
+                solid.push_str(line);
+                solid.push('\n');
+            }
+            (_, None) => {
+                let text = format!("`{word}` stands outside of any `solid`; repair the line");
+                return Err(Fault::at(number, text));
+            }
+        }
+    }
+    solids.extend(open);
+    Ok(solids)
+}
+
+/// Appends the triangles of a binary file, or of one solid of a text.
+fn append(bytes: &[u8], mesh: &mut RawMesh) -> Result<(), Fault> {
     let mut cursor = Cursor::new(bytes);
     let reader = stl_io::create_stl_reader(&mut cursor).map_err(|e| {
         Fault::new(format!(
@@ -17,8 +80,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
             no_header(&e)
         ))
     })?;
-    let mut mesh = RawMesh::default();
-    for (number, triangle) in reader.enumerate() {
+    for triangle in reader {
+        let number = mesh.triangles.len();
         let triangle = triangle.map_err(|e| Fault::new(broken_triangle(number, bytes, &e)))?;
         let first = mesh.vertices.len();
         for corner in triangle.vertices {
@@ -32,7 +95,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
         };
         mesh.triangles.push([first, first + 1, first + 2]);
     }
-    Ok(mesh.welded())
+    Ok(())
 }
 
 /// Why a file does not begin as STL files do.
@@ -51,10 +114,7 @@ fn broken_triangle(number: usize, bytes: &[u8], error: &std::io::Error) -> Strin
         .and_then(|b| b.try_into().ok())
         .map(u32::from_le_bytes);
     match promised {
-        Some(promised)
-            if error.kind() == std::io::ErrorKind::UnexpectedEof
-                && !bytes.starts_with(b"solid") =>
-        {
+        Some(promised) if error.kind() == std::io::ErrorKind::UnexpectedEof && !is_text(bytes) => {
             let there = bytes.len().saturating_sub(HEADER_BYTES) / TRIANGLE_BYTES;
             format!(
                 "is cut off: {promised} triangles are promised, {there} are there; copy the file again"
@@ -94,6 +154,44 @@ mod tests {
     fn text_files_are_read_too() {
         let text = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
         assert_eq!(parse(text).unwrap().triangles, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn all_solids_of_a_text_are_read() {
+        let solid = |name: &str, z: u8| {
+            format!(
+                "solid {name}\nfacet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\nendsolid {name}\n"
+            )
+        };
+        let mesh = parse((solid("a", 0) + "\n" + &solid("", 1)).as_bytes()).unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
+        let fault = parse((solid("a", 0) + "facet normal 0 0 1\n").as_bytes()).unwrap_err();
+        assert_eq!(
+            fault,
+            Fault::at(10, "`facet` stands outside of any `solid`; repair the line")
+        );
+    }
+
+    #[test]
+    fn a_binary_file_that_begins_like_a_text_is_read() {
+        let mut bytes = binary(1, &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        bytes[..8].copy_from_slice(b"solid a\n");
+        assert_eq!(parse(&bytes).unwrap().triangles, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn triangles_beyond_those_that_are_promised_are_named() {
+        let corners = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let text = parse(&binary(1, &[corners, corners].concat()))
+            .unwrap_err()
+            .text;
+        assert_eq!(
+            text,
+            "is too long: 1 triangles are promised, but 50 bytes follow them; export the file again"
+        );
+        // Padding holds no triangle.
+        let padded = [binary(1, &corners), vec![0; 7]].concat();
+        assert_eq!(parse(&padded).unwrap().triangles.len(), 1);
     }
 
     #[test]
