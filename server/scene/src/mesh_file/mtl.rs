@@ -11,6 +11,7 @@
 use std::path::Path;
 
 use super::material::Material;
+use super::read::without_mark;
 use crate::appearance::{Appearance, linear};
 use crate::files::read_bytes;
 use crate::problem::Problem;
@@ -24,7 +25,7 @@ const MAX_FAULTS: usize = 3;
 pub(super) fn read_library(path: &Path, list: &mut [Material]) -> Result<Vec<String>, Problem> {
     let bytes = read_bytes(path, MAX_BYTES)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
-    let faults = parse(&String::from_utf8_lossy(&bytes), list);
+    let faults = parse(&String::from_utf8_lossy(without_mark(&bytes)), list);
     let named = faults.into_iter().take(MAX_FAULTS);
     Ok(named
         .map(|(line, key)| format!("`{key}` in line {line} of {file}, which has no usable numbers"))

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use god_object::surface::CornerCoordinates;
 
 use super::material::{Material, Materials};
-use super::read::finite_vertex;
+use super::read::{finite_vertex, without_mark};
 use super::{Fault, RawMesh};
 
 /// Most corners of one face. More is a broken line.
@@ -13,7 +13,7 @@ const MAX_FACE_CORNERS: usize = 10_000;
 
 /// The mesh; which material each face names goes to `materials`.
 pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, Fault> {
-    let text = String::from_utf8_lossy(bytes); // names in comments and groups may be in any encoding
+    let text = String::from_utf8_lossy(without_mark(bytes)); // names in comments and groups may be in any encoding
     let mut mesh = RawMesh::default();
     let mut places: HashMap<String, usize> = HashMap::new();
     let mut material = None;
@@ -74,7 +74,7 @@ fn named<'l>(line: &'l str, key: &str) -> &'l str {
 
 /// Texture coordinates of every triangle that [`parse`] gives, in its order. v of the file runs up the picture; here it runs down.
 pub(super) fn parse_texture_coordinates(bytes: &[u8]) -> Result<Vec<CornerCoordinates>, Fault> {
-    let text = String::from_utf8_lossy(bytes);
+    let text = String::from_utf8_lossy(without_mark(bytes));
     let mut pairs: Vec<[f64; 2]> = Vec::new();
     // Faces may name pairs that come later.
     let mut faces: Vec<(usize, [u32; 3])> = Vec::new();
@@ -211,6 +211,14 @@ mod tests {
             parse(b"# square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1e-9\nf 1/1/1 2//2 3 -1\n").unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices[3].z, 1e-9);
+    }
+
+    #[test]
+    fn a_mark_before_the_text_is_skipped() {
+        let text = "\u{feff}v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        assert_eq!(parse(text.as_bytes()).unwrap().vertices.len(), 3);
+        let text = "\u{feff}vt 0 0\nf 1/1 2/1 3/1\n";
+        assert!(parse_texture_coordinates(text.as_bytes()).is_ok());
     }
 
     #[test]

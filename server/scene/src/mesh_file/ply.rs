@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use super::read::{finite_vertex, is_blank};
+use super::read::{finite_vertex, is_blank, without_mark};
 use super::{Fault, RawMesh};
 
 /// Longest header, bytes.
@@ -133,7 +133,7 @@ pub(super) fn has_colours(bytes: &[u8]) -> bool {
 fn header(bytes: &[u8]) -> Result<(Format, Vec<Element>, &[u8]), Fault> {
     let mut format = None;
     let mut elements: Vec<Element> = Vec::new();
-    let mut rest = bytes;
+    let mut rest = without_mark(bytes);
     let mut number = 0;
     loop {
         number += 1;
@@ -495,6 +495,12 @@ mod tests {
         assert_eq!(mesh.vertices.len(), 4);
         assert_eq!(mesh.vertices[3].z, 0.5);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn a_mark_before_the_text_is_skipped() {
+        let mesh = parse(("\u{feff}".to_owned() + TEXT).as_bytes()).unwrap();
+        assert_eq!(mesh, parse(TEXT.as_bytes()).unwrap());
     }
 
     #[test]

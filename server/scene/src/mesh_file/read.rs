@@ -127,6 +127,11 @@ pub(crate) fn finite_vertex(
     }
 }
 
+/// Without the mark (U+FEFF in UTF-8) that some programs write before the first character of a text.
+pub(super) fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
+}
+
 /// Whether these bytes hold nothing: padding that some programs write behind the last element.
 pub(super) fn is_blank(bytes: &[u8]) -> bool {
     bytes.iter().all(|b| *b == 0 || b.is_ascii_whitespace())

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::io::Cursor;
 
-use super::read::{finite_vertex, is_blank};
+use super::read::{finite_vertex, is_blank, without_mark};
 use super::{Fault, RawMesh};
 
 /// Bytes before the first triangle of a binary file, and bytes per triangle.
@@ -37,14 +37,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
 
 /// Whether the file begins as a text does. A binary file may do so, too, but its count of triangles has a byte of 0.
 fn is_text(bytes: &[u8]) -> bool {
-    let after = bytes.trim_ascii_start().strip_prefix(b"solid");
+    let after = without_mark(bytes)
+        .trim_ascii_start()
+        .strip_prefix(b"solid");
     after.is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_whitespace))
         && !bytes.contains(&0)
 }
 
 /// The solids of a text, each for itself and without its name: the crate reads to the first `endsolid`.
 fn solids(bytes: &[u8]) -> Result<Vec<String>, Fault> {
-    let text = String::from_utf8_lossy(bytes);
+    let text = String::from_utf8_lossy(without_mark(bytes));
     let mut solids: Vec<String> = Vec::new();
     let mut open: Option<String> = None;
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
@@ -154,6 +156,8 @@ mod tests {
     fn text_files_are_read_too() {
         let text = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
         assert_eq!(parse(text).unwrap().triangles, [[0, 1, 2]]);
+        let marked = [b"\xEF\xBB\xBF", &text[..]].concat();
+        assert_eq!(parse(&marked).unwrap().triangles, [[0, 1, 2]]);
     }
 
     #[test]
