@@ -37,16 +37,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
 
 /// Whether the file begins as a text does. A binary file may do so, too, but its count of triangles has a byte of 0.
 fn is_text(bytes: &[u8]) -> bool {
-    let after = without_mark(bytes)
-        .trim_ascii_start()
-        .strip_prefix(b"solid");
-    after.is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_whitespace))
-        && !bytes.contains(&0)
+    let start = without_mark(bytes).trim_ascii_start();
+    let named = start.split_first_chunk::<5>();
+    named.is_some_and(|(word, rest)| {
+        word.eq_ignore_ascii_case(b"solid") && rest.first().is_some_and(u8::is_ascii_whitespace)
+    }) && !bytes.contains(&0)
 }
 
-/// The solids of a text, each for itself and without its name: the crate reads to the first `endsolid`.
+/// The solids of a text, each for itself, without its name and in small letters: the crate reads to the first `endsolid`, and no capitals.
 fn solids(bytes: &[u8]) -> Result<Vec<String>, Fault> {
-    let text = String::from_utf8_lossy(without_mark(bytes));
+    let text = String::from_utf8_lossy(without_mark(bytes)).to_ascii_lowercase();
     let mut solids: Vec<String> = Vec::new();
     let mut open: Option<String> = None;
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
@@ -156,6 +156,8 @@ mod tests {
     fn text_files_are_read_too() {
         let text = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
         assert_eq!(parse(text).unwrap().triangles, [[0, 1, 2]]);
+        let capitals = text.to_ascii_uppercase();
+        assert_eq!(parse(&capitals).unwrap().triangles, [[0, 1, 2]]);
         let marked = [b"\xEF\xBB\xBF", &text[..]].concat();
         assert_eq!(parse(&marked).unwrap().triangles, [[0, 1, 2]]);
     }
