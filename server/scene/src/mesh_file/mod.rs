@@ -5,6 +5,7 @@ mod material;
 mod mtl;
 mod obj;
 mod ply;
+mod polygon;
 mod raw_mesh;
 mod read;
 mod stl;

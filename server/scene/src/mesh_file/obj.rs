@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use god_object::surface::CornerCoordinates;
 
 use super::material::{Material, Materials};
+use super::polygon::{Polygons, triangles};
 use super::read::{finite_vertex, without_mark};
 use super::{Fault, RawMesh};
 
@@ -15,6 +16,7 @@ const MAX_FACE_CORNERS: usize = 10_000;
 pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, Fault> {
     let text = String::from_utf8_lossy(without_mark(bytes)); // names in comments and groups may be in any encoding
     let mut mesh = RawMesh::default();
+    let (mut polygons, mut faces) = (Polygons::default(), 0);
     let mut places: HashMap<String, usize> = HashMap::new();
     let mut material = None;
     // Faces may name vertices that come later: remember the line, check at the end.
@@ -36,7 +38,8 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
                 if largest > first_line_of_largest.0 || first_line_of_largest.1 == 0 {
                     first_line_of_largest = (largest, number);
                 }
-                mesh.push_polygon(&corners);
+                faces += 1;
+                polygons.push(&mut mesh, &corners, faces, Some(number));
                 materials.push(material, corners.len() - 2);
             }
             // Names may hold blanks.
@@ -64,6 +67,7 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
         );
         return Err(Fault::at(line, text));
     }
+    polygons.triangulate(&mut mesh)?;
     Ok(mesh)
 }
 
@@ -75,9 +79,10 @@ fn named<'l>(line: &'l str, key: &str) -> &'l str {
 /// Texture coordinates of every triangle that [`parse`] gives, in its order. v of the file runs up the picture; here it runs down.
 pub(super) fn parse_texture_coordinates(bytes: &[u8]) -> Result<Vec<CornerCoordinates>, Fault> {
     let text = String::from_utf8_lossy(without_mark(bytes));
+    let mut vertices = Vec::new();
     let mut pairs: Vec<[f64; 2]> = Vec::new();
-    // Faces may name pairs that come later.
-    let mut faces: Vec<(usize, [u32; 3])> = Vec::new();
+    // Faces may name vertices and pairs that come later.
+    let mut faces: Vec<(usize, Vec<u32>, Vec<u32>)> = Vec::new();
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
         let mut words = line
             .split('#')
@@ -85,6 +90,8 @@ pub(super) fn parse_texture_coordinates(bytes: &[u8]) -> Result<Vec<CornerCoordi
             .unwrap_or_default()
             .split_whitespace();
         match words.next() {
+            Some("v") => vertices
+                .push(vertex(vertices.len(), words).map_err(|text| Fault::at(number, text))?),
             Some("vt") => {
                 let [u, v] =
                     [words.next(), words.next()].map(|word| word.unwrap_or("0").parse::<f64>());
@@ -95,32 +102,38 @@ pub(super) fn parse_texture_coordinates(bytes: &[u8]) -> Result<Vec<CornerCoordi
                 pairs.push([u, 1.0 - v]);
             }
             Some("f") => {
-                let corners: Vec<u32> = words
-                    .take(MAX_FACE_CORNERS)
-                    .map(|word| coordinate_of(word, pairs.len()))
-                    .collect::<Result<_, _>>()
-                    .map_err(|text| Fault::at(number, text))?;
-                let fan = corners.windows(2).skip(1);
-                faces.extend(fan.map(|pair| (number, [corners[0], pair[0], pair[1]])));
+                let fail = |text| Fault::at(number, text);
+                let corners = face(words.clone(), vertices.len()).map_err(fail)?;
+                let of_corners = words.map(|word| coordinate_of(word, pairs.len()));
+                let of_corners = of_corners.collect::<Result<_, _>>().map_err(fail)?;
+                faces.push((number, corners, of_corners));
             }
             _ => {}
         }
     }
-    let of_face = |(number, corners): (usize, [u32; 3])| {
-        let mut found = [[0.0; 2]; 3];
-        for (place, corner) in found.iter_mut().zip(corners) {
-            *place = *pairs.get(corner as usize).ok_or_else(|| {
-                let text = format!(
-                    "a face names texture coordinate {}, but the file has {}; repair the mesh",
-                    corner + 1,
-                    pairs.len()
-                );
-                Fault::at(number, text)
-            })?;
-        }
-        Ok(found)
-    };
-    faces.into_iter().map(of_face).collect()
+    let mut found = Vec::new();
+    for (number, corners, of_corners) in faces {
+        let missing = |what: &str, index: u32, count: usize| {
+            let text = format!(
+                "a face names {what} {}, but the file has {count}; repair the mesh",
+                index + 1
+            );
+            Fault::at(number, text)
+        };
+        let placed = |corner: u32| {
+            let point = vertices.get(corner as usize).copied();
+            point.ok_or_else(|| missing("vertex", corner, vertices.len()))
+        };
+        let pair = |corner: u32| {
+            let pair = pairs.get(corner as usize).copied();
+            pair.ok_or_else(|| missing("texture coordinate", corner, pairs.len()))
+        };
+        let of_corners: Vec<_> = of_corners.into_iter().map(pair).collect::<Result<_, _>>()?;
+        let points: Vec<_> = corners.into_iter().map(placed).collect::<Result<_, _>>()?;
+        let cut = triangles(&points).map_err(|why| Fault::at(number, format!("a face {why}")))?;
+        found.extend(cut.into_iter().map(|t| t.map(|corner| of_corners[corner])));
+    }
+    Ok(found)
 }
 
 /// The second of `v/vt/vn`, counted from 0.
@@ -217,13 +230,13 @@ mod tests {
     fn a_mark_before_the_text_is_skipped() {
         let text = "\u{feff}v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         assert_eq!(parse(text.as_bytes()).unwrap().vertices.len(), 3);
-        let text = "\u{feff}vt 0 0\nf 1/1 2/1 3/1\n";
+        let text = "\u{feff}vt 0 0\nv 0 0 0\nf 1/1 1/1 1/1\n";
         assert!(parse_texture_coordinates(text.as_bytes()).is_ok());
     }
 
     #[test]
     fn texture_coordinates_follow_the_fan_of_triangles() {
-        let text = "vt 0 0\nvt 1 0\nf 1/1 2/2/7 3/3 4/-1\nvt 1 1\nvt 0 0.25\n";
+        let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nf 1/1 2/2/7 3/3 4/-1\nvt 1 1\nvt 0 0.25\n";
         // -1 is the last one so far.
         let fan = parse_texture_coordinates(text.as_bytes()).unwrap();
         assert_eq!(
@@ -232,6 +245,30 @@ mod tests {
                 [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0]],
                 [[0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]
             ]
+        );
+    }
+
+    #[test]
+    fn concave_faces_are_covered_and_their_texture_coordinates_follow() {
+        let text = "v 2 -1 0\nv 1 0 0\nv 2 1 0\nv 0 0 0\nvt 0 1\nvt 1 1\nvt 2 1\nvt 3 1\nf 1/1 2/2 3/3 4/4\n";
+        let turned = text.replace("1/1 2/2 3/3 4/4", "4/4 1/1 2/2 3/3");
+        for (text, expected) in [
+            (text, [[3, 0, 1], [1, 2, 3]]),
+            (&turned, [[3, 0, 1], [3, 1, 2]]),
+        ] {
+            assert_eq!(parse(text.as_bytes()).unwrap().triangles, expected);
+            let of_corners = parse_texture_coordinates(text.as_bytes()).unwrap();
+            assert_eq!(of_corners, expected.map(|t| t.map(|c| [f64::from(c), 0.0])));
+        }
+        let bow = "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 4\n";
+        let fault = parse(bow.as_bytes()).unwrap_err();
+        assert_eq!(fault.line, Some(5));
+        assert!(
+            fault
+                .text
+                .starts_with("face 1 of 4 corners is no simple polygon"),
+            "{}",
+            fault.text
         );
     }
 

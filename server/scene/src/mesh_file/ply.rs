@@ -4,6 +4,7 @@
 
 use std::fmt::Write as _;
 
+use super::polygon::Polygons;
 use super::read::{finite_vertex, is_blank, without_mark};
 use super::{Fault, RawMesh};
 
@@ -83,10 +84,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
         },
     };
     let mut mesh = RawMesh::default();
+    let mut polygons = Polygons::default();
     for element in &elements {
         match element.name.as_str() {
             "vertex" => vertices(element, &mut source, &mut mesh)?,
-            "face" => faces(element, &mut source, &mut mesh)?,
+            "face" => faces(element, &mut source, &mut mesh, &mut polygons)?,
             _ => {
                 for number in 0..element.count {
                     for property in &element.properties {
@@ -118,6 +120,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
             return Err(Fault::new(text));
         }
     }
+    polygons.triangulate(&mut mesh)?;
     Ok(mesh)
 }
 
@@ -264,7 +267,12 @@ fn vertices(element: &Element, source: &mut Source<'_>, mesh: &mut RawMesh) -> R
     Ok(())
 }
 
-fn faces(element: &Element, source: &mut Source<'_>, mesh: &mut RawMesh) -> Result<(), Fault> {
+fn faces(
+    element: &Element,
+    source: &mut Source<'_>,
+    mesh: &mut RawMesh,
+    polygons: &mut Polygons,
+) -> Result<(), Fault> {
     let is_corners = |p: &Property| {
         p.count.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index")
     };
@@ -318,7 +326,7 @@ fn faces(element: &Element, source: &mut Source<'_>, mesh: &mut RawMesh) -> Resu
                 text,
             });
         }
-        mesh.push_polygon(&corners);
+        polygons.push(mesh, &corners, number, source.finished_line());
     }
     Ok(())
 }
@@ -495,6 +503,27 @@ mod tests {
         assert_eq!(mesh.vertices.len(), 4);
         assert_eq!(mesh.vertices[3].z, 0.5);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn a_concave_face_is_covered_and_one_that_crosses_itself_is_named() {
+        // The fan around the first corner would cover the notch, which is at the third.
+        let arrow = TEXT.replace("1 0 0 9\n1 1 0 9\n0 1 0.5 9", "2 -1 0 9\n1 0 0 9\n2 1 0 9");
+        let turned = arrow.replace("4 0 1 2 3", "4 1 2 3 0");
+        assert_eq!(
+            parse(turned.as_bytes()).unwrap().triangles,
+            [[0, 1, 2], [2, 3, 0]]
+        );
+        let bow = TEXT.replace("0.5", "0").replace("4 0 1 2 3", "4 0 2 1 3");
+        let fault = parse(bow.as_bytes()).unwrap_err();
+        assert_eq!(fault.line, Some(16));
+        assert!(
+            fault
+                .text
+                .starts_with("face 0 of 4 corners is no simple polygon"),
+            "{}",
+            fault.text
+        );
     }
 
     #[test]

@@ -35,7 +35,7 @@ impl RawMesh {
         )
     }
 
-    /// Appends a polygon as a fan of triangles around its first corner.
+    /// Appends a convex polygon as a fan of triangles around its first corner.
     pub(crate) fn push_polygon(&mut self, corners: &[u32]) {
         for pair in corners.windows(2).skip(1) {
             self.triangles.push([corners[0], pair[0], pair[1]]);

@@ -63,7 +63,7 @@ pub(super) fn extension(path: &Path) -> String {
 
 /// Reads a mesh; the format follows from the name: .ply .obj .stl .glb .gltf.
 ///
-/// Polygons become fans of triangles; formats without shared indices (STL, glTF) are welded where coordinates are
+/// Polygons become triangles that cover them; formats without shared indices (STL, glTF) are welded where coordinates are
 /// exactly equal. All coordinates are finite and all indices in range. Whether the surface is closed is another
 /// question: `god_object::Mesh` answers it.
 pub fn read_mesh(path: &Path) -> Result<RawMesh, FileError> {
