@@ -171,6 +171,10 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
         }
         let (shape, pose) = (shape(&section), pose(&section));
         let (surface, height_map) = surface(&section);
+        if let Some(written) = section.get("pose").filter(|_| section.has("motion")) {
+            let text = "`pose` in [[obstacle]] has no meaning beside `motion`, whose trace says where the obstacle is; leave it out";
+            section.complain(&written.at, text);
+        }
         let motion = section.section("motion").and_then(motion);
         let appearance = appearance(&section);
         let at = section.at();

@@ -101,6 +101,13 @@ fn every_fault_names_file_line_and_key() {
             "s.toml:10: unknown key `frction` in [[obstacle]] surface; did you mean `friction`?",
         ),
         (
+            changed(
+                "surface =",
+                "motion = { trace = \"a.csv\" }\npose = { position = [0.0, 0.0, 0.1] }\nsurface =",
+            ),
+            "s.toml:11: `pose` in [[obstacle]] has no meaning beside `motion`, whose trace says where the obstacle is; leave it out",
+        ),
+        (
             changed("[limits]", "[limit]"),
             "s.toml:17: unknown key `limit` in the file; did you mean `limits`?",
         ),
