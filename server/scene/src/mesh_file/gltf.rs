@@ -9,6 +9,7 @@ use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
 use god_object::surface::CornerCoordinates;
 use nalgebra::{Matrix4, Point3};
+use percent_encoding::percent_decode_str;
 
 use super::material::{Material, Materials};
 use super::read::finite_vertex;
@@ -72,6 +73,12 @@ fn parse_with(
         let parent_from_node = Matrix4::from(node.transform().matrix()).cast::<f64>();
         let world_from_node = world_from_parent * parent_from_node;
         if let Some(of_node) = node.mesh() {
+            if is_morphed(&node, &of_node) {
+                return Err(Fault::new(format!(
+                    "mesh {} has morph targets with weights, which are not applied; apply its shape keys, and export it without morph targets",
+                    of_node.index()
+                )));
+            }
             for primitive in of_node.primitives() {
                 let before = mesh.triangles.len();
                 append(
@@ -99,6 +106,14 @@ fn parse_with(
         );
     }
     Ok(mesh)
+}
+
+/// Whether the vertices are not where the mesh has them. A node's weights count before its mesh's.
+fn is_morphed(node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>) -> bool {
+    let weights = node.weights().or(mesh.weights()).unwrap_or_default();
+    let mut primitives = mesh.primitives();
+    weights.iter().any(|weight| *weight != 0.0)
+        && primitives.any(|primitive| primitive.morph_targets().next().is_some())
 }
 
 /// What a material says without pictures: a factor of a picture says nothing alone.
@@ -199,7 +214,10 @@ fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, 
                     })?
                 }
                 _ => {
-                    let named = Path::new(uri);
+                    let decoded = percent_decode_str(uri).decode_utf8().map_err(|_| {
+                        Fault::new(format!("buffer {number} is `{uri}`, which is no text when its %.. are decoded; export it as .glb"))
+                    })?;
+                    let named = Path::new(&*decoded);
                     let inside = named
                         .components()
                         .all(|c| matches!(c, std::path::Component::Normal(_)));
@@ -553,6 +571,41 @@ mod tests {
             text,
             "buffer 0 is `../secret.bin`, but must lie beside the file; export it as .glb"
         );
+    }
+
+    #[test]
+    fn a_buffer_beside_the_file_may_have_a_name_that_is_encoded() {
+        let text = triangle("", 2);
+        let (head, tail) = text.split_once("data:").unwrap();
+        let (data, tail) = tail.split_once('"').unwrap();
+        let bytes = decode_base64(data.split_once(',').unwrap().1).unwrap();
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("a b.bin"), bytes).unwrap();
+        let read = |uri: &str| {
+            parse(
+                format!("{head}{uri}\"{tail}").as_bytes(),
+                Some(directory.path()),
+            )
+        };
+        assert_eq!(read("a%20b.bin").unwrap().triangles, [[0, 1, 2]]);
+        let text = read("%2E%2E/a%20b.bin").unwrap_err().text;
+        assert!(text.contains("must lie beside the file"), "{text}");
+    }
+
+    #[test]
+    fn morph_targets_are_refused_where_they_have_weights() {
+        let with_targets = |node: &str| {
+            triangle(node, 2).replace(
+                "\"indices\":0",
+                "\"indices\":0,\"targets\":[{\"POSITION\":1}]",
+            )
+        };
+        assert!(parse(with_targets("").as_bytes(), None).is_ok());
+        assert!(parse(with_targets(r#","weights":[0.0]"#).as_bytes(), None).is_ok());
+        let text = parse(with_targets(r#","weights":[0.5]"#).as_bytes(), None)
+            .unwrap_err()
+            .text;
+        assert!(text.starts_with("mesh 0 has morph targets"), "{text}");
     }
 
     #[test]
