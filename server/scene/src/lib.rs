@@ -18,6 +18,7 @@ mod progress;
 mod runner;
 mod scene;
 pub mod shapes;
+mod shell_word;
 mod simplified_cache;
 mod simplify;
 mod trace;
@@ -42,6 +43,7 @@ pub use scene::{
     ScenerySpec, Shape, ShippedScene, View, shipped_scene_text,
 };
 pub use simplify::{Simplified, simplify};
+pub use shell_word::shell_word;
 pub use taut_plant::HandPreset;
 pub use taut_recording::{NORM_TOLERANCE, unit_quaternion};
 pub use trace::{

@@ -182,6 +182,14 @@ fn check_toml(path: &Path) -> FileReport {
     }
 }
 
+/// A length of m in um, with a digit even where it is far below one.
+fn micrometres(length: f64) -> String {
+    match length * 1e6 {
+        um @ 1e-2.. => format!("{um:.3}"),
+        um => format!("{um:.1e}"),
+    }
+}
+
 /// What to ask about the longest side of a body, m, where it is none that a hand can hold.
 fn doubt_about_size(body: &str, longest: f64) -> Option<String> {
     let [least, most] = SUSPICIOUS_SIZES;
@@ -246,9 +254,9 @@ fn summarise_scene(
     }
     let settings = &built.settings;
     summary += &format!(
-        ", rest distance {:.3} um (fits down to {:.3} um a side; for tighter ones give clearance in [method])",
-        settings.rest_distance * 1e6,
-        settings.least_clearance() * 1e6
+        ", rest distance {} um (fits down to {} um a side; for tighter ones give clearance in [method])",
+        micrometres(settings.rest_distance),
+        micrometres(settings.least_clearance())
     );
     if !exact.is_empty() {
         summary += &format!(", exact: {}", exact.join(", "));

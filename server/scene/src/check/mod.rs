@@ -5,5 +5,5 @@ mod report;
 
 pub(crate) use inspect::SUSPICIOUS_SIZES;
 pub use inspect::check;
-pub(crate) use report::place_text;
 pub use report::{FaultPlaces, FileKind, FileReport, MeshFigures};
+pub(crate) use report::{place_text, size_text};

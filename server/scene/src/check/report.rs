@@ -242,6 +242,15 @@ impl fmt::Display for MeshFault {
     }
 }
 
+/// The sides of a box, m: four decimals, and the digits of a side too thin for them.
+pub(crate) fn size_text(sides: [f64; 3]) -> String {
+    let [x, y, z] = sides.map(|side| match side {
+        1e-3.. => format!("{side:.4}"),
+        _ => format!("{side:.3e}"),
+    });
+    format!("{x} x {y} x {z} m")
+}
+
 /// A place as messages show it.
 pub(crate) fn place_text(place: &Point3<f64>) -> String {
     format!("({:.5}, {:.5}, {:.5}) m", place.x, place.y, place.z)
@@ -276,12 +285,10 @@ impl fmt::Display for MeshFigures {
         let yes_no = |b: bool| if b { "yes" } else { "NO" };
         write!(
             f,
-            "mesh, {} triangles, {} vertices, {:.4} x {:.4} x {:.4} m, watertight {}, oriented {}, {} degenerate, {} duplicate, smallest feature ",
+            "mesh, {} triangles, {} vertices, {}, watertight {}, oriented {}, {} degenerate, {} duplicate, smallest feature ",
             self.triangles,
             self.vertices,
-            self.size_m[0],
-            self.size_m[1],
-            self.size_m[2],
+            size_text(self.size_m),
             yes_no(self.watertight),
             yes_no(self.oriented),
             self.degenerate_faces,

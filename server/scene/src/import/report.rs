@@ -6,7 +6,8 @@ use nalgebra::Point3;
 use serde::Serialize;
 
 use crate::appearance::Appearance;
-use crate::check::{MeshFigures, place_text};
+use crate::check::{MeshFigures, place_text, size_text};
+use crate::shell_word::shell_word;
 use crate::simplify::Simplified;
 
 /// Most places that are kept of one finding.
@@ -150,15 +151,15 @@ impl fmt::Display for Finding {
 impl fmt::Display for PartReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let assumed = if self.unit_assumed { ", assumed" } else { "" };
-        let [x, y, z] = self.mesh.size_m;
         write!(
             f,
-            "{} (in {}{assumed}): {} in {}, {} triangles, {x:.4} x {y:.4} x {z:.4} m, {:.3e} m^3",
+            "{} (in {}{assumed}): {} in {}, {} triangles, {}, {:.3e} m^3",
             self.file,
             self.unit,
             self.body,
             self.mesh_file,
             self.mesh.triangles,
+            size_text(self.mesh.size_m),
             self.mesh.volume_m3
         )?;
         for finding in &self.findings {
@@ -190,7 +191,8 @@ impl fmt::Display for ImportReport {
         write!(
             f,
             "written: {}; try it: taut demo --scene {}",
-            self.folder, self.scene
+            self.folder,
+            shell_word(&self.scene)
         )
     }
 }

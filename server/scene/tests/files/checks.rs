@@ -43,6 +43,21 @@ fn a_sound_mesh_gets_its_figures() {
 }
 
 #[test]
+fn lengths_far_below_a_micrometre_have_digits() {
+    let report = Folder::new().check("thin.ply", write_ply(&cuboid([0.1, 0.2, 1e-6])));
+    assert!(
+        report.summary.contains("0.2000 x 0.4000 x 2.000e-6 m,"),
+        "{report}"
+    );
+    let scene = "name = \"a\"\n[god_object]\nshape = { sphere = { radius = 0.01 } }\nmass = 1\n[method]\nclearance = 1e-9\n";
+    let report = Folder::new().check("scene.toml", scene.as_bytes());
+    assert!(
+        report.summary.contains("rest distance 1.0e-4 um"),
+        "{report}"
+    );
+}
+
+#[test]
 fn a_closed_part_inside_out_is_named_with_its_place_and_a_cavity_is_not() {
     let with_part = |half: f64, x: f64| {
         let (mut mesh, part) = (cuboid([0.1; 3]), cuboid([half; 3]));

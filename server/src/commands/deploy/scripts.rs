@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use taut_scene::Machine;
+use taut_scene::{Machine, shell_word};
 
 use super::archive::{File, Mode};
 use super::units::Unit;
@@ -88,7 +88,7 @@ impl Scripts<'_> {
                 text,
                 "install -D -m {:04o}{owner} {} {}",
                 file.mode.bits(),
-                word(&file.path.display().to_string()),
+                shell_word(&file.path.display().to_string()),
                 installed(file),
             );
         }
@@ -171,7 +171,7 @@ impl Scripts<'_> {
 /// Where a file of the archive is on the machine, as a word of a shell command.
 fn installed(file: &File) -> String {
     let path = file.path.strip_prefix("etc").unwrap_or(&file.path);
-    word(&format!("/etc/taut/{}", path.display()))
+    shell_word(&format!("/etc/taut/{}", path.display()))
 }
 
 /// A render node's credential is read by the account that draws, everything else by `taut`.
@@ -179,13 +179,4 @@ fn is_of_session(path: &Path) -> bool {
     path.file_name()
         .and_then(|name| name.to_str())
         .is_some_and(|name| name.starts_with("render-"))
-}
-
-/// One word of a shell command.
-fn word(text: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./".contains(c);
-    if text.chars().all(is_plain) {
-        return text.to_owned();
-    }
-    format!("'{}'", text.replace('\'', "'\\''"))
 }
