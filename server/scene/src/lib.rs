@@ -32,6 +32,7 @@ pub use fidelity::FidelityPlan;
 pub use files::{DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, data_dir, data_dirs, data_file};
 pub use import::{
     Finding, ImportReport, ImportRequest, LengthUnit, MAX_HOLE_EDGES, PartReport, import,
+    import_unless,
 };
 pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply};
 pub use problem::{FileError, Problem};
@@ -42,8 +43,8 @@ pub use scene::{
     MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, SceneSource,
     ScenerySpec, Shape, ShippedScene, View, shipped_scene_text,
 };
-pub use simplify::{Simplified, simplify};
 pub use shell_word::shell_word;
+pub use simplify::{Simplified, simplify};
 pub use taut_plant::HandPreset;
 pub use taut_recording::{NORM_TOLERANCE, unit_quaternion};
 pub use trace::{

@@ -5,6 +5,7 @@ use taut_scene::{ImportReport, ImportRequest};
 use super::preview;
 use crate::cli::ImportArgs;
 use crate::shared::failure::Failure;
+use crate::shared::shutdown::Shutdown;
 
 /// Imports, or says every fault of every part.
 pub(super) fn run(args: &ImportArgs) -> Result<ImportReport, Failure> {
@@ -18,9 +19,21 @@ pub(super) fn run(args: &ImportArgs) -> Result<ImportReport, Failure> {
         name: args.name.clone(),
         obstacles_only: args.obstacle,
     };
-    let mut report = taut_scene::import(&request).map_err(|error| {
+    // Until there is something to remove, a signal ends the process as ever.
+    let mut signals = None;
+    let mut is_interrupted = || {
+        let listening = signals.get_or_insert_with(Shutdown::by_signals);
+        listening.as_ref().is_ok_and(Shutdown::is_asked)
+    };
+    let imported = taut_scene::import_unless(&request, &mut is_interrupted);
+    let mut report = imported.map_err(|error| {
         let all: Vec<String> = error.problems().iter().map(ToString::to_string).collect();
-        Failure::bad_input(all.join("\n"))
+        let all = all.join("\n");
+        if is_interrupted() {
+            Failure::Failed(all)
+        } else {
+            Failure::BadInput(all)
+        }
     })?;
     // A picture is a help, not part of the scene.
     match preview::beside(&report.scene) {

@@ -65,7 +65,16 @@ pub struct ImportRequest {
 
 /// Reads, repairs and writes. All faults of all parts are reported; with any, nothing is written.
 pub fn import(request: &ImportRequest) -> Result<ImportReport, FileError> {
-    let folder = NewFolder::create(&request.folder)?;
+    import_unless(request, &mut || false)
+}
+
+/// The same, ended where `is_interrupted` says so: it is asked before the folder is made and between its files. Nothing is left then.
+pub fn import_unless(
+    request: &ImportRequest,
+    is_interrupted: &mut dyn FnMut() -> bool,
+) -> Result<ImportReport, FileError> {
+    // What cannot be made is refused before the work; nothing is there while it lasts.
+    drop(NewFolder::create(&request.folder)?);
     let mut problems = Vec::new();
     let mut names = vec![GOD_OBJECT_NAME.to_owned()];
     let mut parts = Vec::new();
@@ -96,12 +105,24 @@ pub fn import(request: &ImportRequest) -> Result<ImportReport, FileError> {
             }
         })
         .collect();
+    let mut go_on = || {
+        if is_interrupted() {
+            let text = "the import was interrupted; nothing was written";
+            return Err(Problem::of_file(request.folder.display(), text));
+        }
+        Ok(())
+    };
+    go_on()?;
+    let folder = NewFolder::create(&request.folder)?;
     let mut reports = Vec::with_capacity(parts.len());
     for (report, mesh) in parts {
+        go_on()?;
         folder.write(&report.mesh_file, &write_ply(&mesh))?;
         reports.push(report);
     }
+    go_on()?;
     write_scene(request, &folder, &placed, &mut notes)?;
+    go_on()?;
     let report = ImportReport {
         folder: request.folder.display().to_string(),
         scene: request.folder.join(SCENE_FILE).display().to_string(),

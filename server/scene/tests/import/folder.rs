@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use taut_scene::{ImportRequest, Scene, check, import};
+use taut_scene::{ImportRequest, Scene, check, import, import_unless};
 
 use super::solids::{Soup, moved, part, scaled};
 use super::write::{ply, stl};
@@ -110,6 +110,51 @@ fn faults_of_all_parts_are_told_at_once_and_nothing_is_left() {
     assert_eq!(error.problems().len(), 2, "{:?}", error.problems());
     assert!(error.problems()[0].file.ends_with("mm.ply"));
     assert_eq!(parts.entries(), before);
+}
+
+#[test]
+fn the_report_can_be_copied_and_a_thin_part_has_a_thickness() {
+    let thin: Soup = part()
+        .into_iter()
+        .map(|t| t.map(|[x, y, z]| [x, y, z * 1e-4]))
+        .collect();
+    let parts = Parts::new(&[("a.ply", &thin)]);
+    let request = ImportRequest {
+        folder: parts.path("my part"),
+        unit: Some("m".parse().unwrap()),
+        ..parts.request(&["a.ply"])
+    };
+    let text = import(&request).unwrap().to_string();
+    assert!(text.contains("0.0600 x 0.0400 x 2.000e-6 m,"), "{text}");
+    assert!(text.ends_with("my part/scene.toml'"), "{text}");
+}
+
+#[test]
+fn an_import_that_is_interrupted_leaves_nothing() {
+    let parts = Parts::new(&[
+        ("a.ply", &part()),
+        ("b.ply", &moved(part(), [0.1, 0.0, 0.0])),
+    ]);
+    let request = parts.request(&["a.ply", "b.ply"]);
+    let before = parts.entries();
+    let mut asked = 0;
+    for end in 1.. {
+        asked = 0;
+        let outcome = import_unless(&request, &mut || {
+            asked += 1;
+            asked == end
+        });
+        if outcome.is_ok() {
+            break;
+        }
+        let error = outcome.unwrap_err().to_string();
+        assert!(
+            error.ends_with("out: the import was interrupted; nothing was written"),
+            "{error}"
+        );
+        assert_eq!(parts.entries(), before);
+    }
+    assert!(asked >= 4, "asked {asked} times");
 }
 
 #[test]
