@@ -9,7 +9,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 use taut_link::proto::text::Printable;
-use taut_scene::Operator;
+use taut_scene::{Operator, shell_word};
 
 use crate::shared::failure::Failure;
 
@@ -146,7 +146,8 @@ fn overview(text: &str) -> Option<String> {
         for (shown, key) in keys {
             let value = object.get(shown)?;
             if !value.is_null() && !is_fixed(key) {
-                let _ = writeln!(lines, "{}.{key}={value}", Printable(name));
+                let name = shell_word(&Printable(name).to_string());
+                let _ = writeln!(lines, "{name}.{key}={value}");
             }
         }
     }
@@ -180,14 +181,17 @@ mod tests {
             "scene": {
                 "coupling": { "k_h": 2000.0, "stiffness": 1000.0 },
                 "objects": [{ "name": "b\u{1b}", "position": [0, 0, 1], "rotation": [1, 0, 0, 0], "color": "#ffffff",
-                              "opacity": 1.0, "friction": null, "moves": true }],
+                              "opacity": 1.0, "friction": null, "moves": true }, { "name": "a b", "position": [0, 0, 1], "rotation": null,
+                              "color": null, "opacity": null, "friction": 0.5, "moves": false }],
                 "more": 3
             }
         });
         let text = overview(&page.to_string()).expect("understood");
         assert!(text.contains("coupling.k_h=2000.0") && text.contains("3 more objects"));
         assert!(text.contains("color=\"#ffffff\"") && text.contains("not in the file: b.color"));
-        assert!(!text.contains("pose") && !text.contains("friction") && !text.contains('\u{1b}'));
+        assert!(!text.contains("rotation") && !text.contains('\u{1b}'));
+        assert!(text.contains("'a b'.pose.position=[0,0,1]\n'a b'.surface.friction=0.5\n"));
+        assert_eq!(text.matches("friction").count(), 1);
         assert_eq!(overview("{}"), None);
     }
 }

@@ -30,7 +30,7 @@ use crate::check::{MeshFigures, place_text};
 use crate::mesh_file::{RawMesh, read_mesh_and_look, write_ply};
 use crate::problem::{FileError, Problem};
 use crate::progress::Progress;
-use crate::scene::{GOD_OBJECT_NAME, Scene};
+use crate::scene::{GOD_OBJECT_NAME, RESERVED_NAMES, Scene};
 use crate::simplify::simplify;
 use folder::NewFolder;
 use repair::{Repaired, Wishes, is_single, repair};
@@ -76,7 +76,7 @@ pub fn import_unless(
     // What cannot be made is refused before the work; nothing is there while it lasts.
     drop(NewFolder::create(&request.folder)?);
     let mut problems = Vec::new();
-    let mut names = vec![GOD_OBJECT_NAME.to_owned()];
+    let mut names = RESERVED_NAMES.map(str::to_owned).to_vec();
     let mut parts = Vec::new();
     for (index, path) in request.parts.iter().enumerate() {
         let own = new_name(path, &mut names);

@@ -4,8 +4,9 @@ use std::fmt;
 
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
+use super::build::GOD_OBJECT_NAME;
 use super::load::Scene;
-use crate::document::nearest;
+use crate::document::{Section, nearest};
 use crate::files::MAX_TOML_BYTES;
 use crate::problem::{FileError, Problem};
 
@@ -18,6 +19,8 @@ const MAX_NAMES: usize = 8;
 /// `[god_object]` and `[coupling]`, in an edit.
 const GOD_OBJECT: &str = "god_object";
 const COUPLING: &str = "coupling";
+/// Names that are no object's.
+pub(crate) const RESERVED_NAMES: [&str; 3] = [GOD_OBJECT_NAME, GOD_OBJECT, COUPLING];
 /// What can be changed of everything that is drawn.
 const OF_BODIES: [&str; 6] = [
     "pose.position",
@@ -218,6 +221,25 @@ impl Scene {
             .get(obstacle)
             .is_some_and(|body| body.motion.is_some())
     }
+}
+
+/// The name of an obstacle or a piece of scenery: one that an edit can say, and that is not another's.
+pub(super) fn object_name(section: &Section<'_>, example: &str) -> Option<String> {
+    let name = section.required_text("name", example)?;
+    let complain = |why: &str| {
+        let at = section.get("name").map_or(section.at(), |node| &node.at);
+        let text = format!(
+            "the name {name:?} in {} {why}; write another",
+            section.name()
+        );
+        section.complain(at, text);
+    };
+    if RESERVED_NAMES.contains(&name) {
+        complain("is that of the held body or of a table");
+    } else if name.contains(|c: char| c == '=' || c.is_control()) || name.trim() != name {
+        complain("has an `=`, a control character or a blank at its ends");
+    }
+    Some(name.to_owned())
 }
 
 /// A value as it is written, without what stands around it.

@@ -12,6 +12,7 @@ mod spec;
 
 pub use build::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
 pub use edit::EditedKey;
+pub(crate) use edit::RESERVED_NAMES;
 pub(crate) use load::mesh_faults;
 pub use load::{Scene, SceneSource};
 pub(crate) use parse_shape::{LENGTH_UNITS, pose_of};

@@ -6,6 +6,7 @@ use god_object::{Adaptation, RotationMetric, SolverKind};
 use nalgebra::Point3;
 use taut_plant::HandPreset;
 
+use super::edit::object_name;
 use super::parse_look::{appearance, scenery};
 use super::parse_shape::{pose, rotation_of, shape, surface};
 use super::spec::{
@@ -157,9 +158,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
             .get("shape")
             .map_or(section.at(), |node| &node.at)
             .clone();
-        let name = section
-            .required_text("name", "name = \"box\"")
-            .map(str::to_owned);
+        let name = object_name(&section, "name = \"box\"");
         if let Some(name) = &name
             && obstacles.iter().any(|other| other.name == *name)
         {
@@ -171,11 +170,11 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
         }
         let (shape, pose) = (shape(&section), pose(&section));
         let (surface, height_map) = surface(&section);
+        let motion = section.section("motion").and_then(motion);
         if let Some(written) = section.get("pose").filter(|_| section.has("motion")) {
             let text = "`pose` in [[obstacle]] has no meaning beside `motion`, whose trace says where the obstacle is; leave it out";
             section.complain(&written.at, text);
         }
-        let motion = section.section("motion").and_then(motion);
         let appearance = appearance(&section);
         let at = section.at();
         if obstacles.len() >= MAX_OBSTACLES {

@@ -1,5 +1,6 @@
 //! How bodies look, and what is only seen, out of a scene file.
 
+use super::edit::object_name;
 use super::parse_shape::{pose, shape};
 use super::spec::{ObstacleSpec, ScenerySpec, Shape};
 use crate::appearance::{Appearance, colour_of_text};
@@ -17,9 +18,7 @@ pub(super) fn scenery(root: &Section<'_>, obstacles: &[ObstacleSpec]) -> Vec<Sce
             section.complain(section.at(), text);
             return scenery;
         }
-        let name = section
-            .required_text("name", "name = \"room\"")
-            .map(str::to_owned);
+        let name = object_name(&section, "name = \"room\"");
         let at = |key| section.get(key).map_or(section.at(), |node| &node.at);
         if let Some(name) = &name {
             let mut others = obstacles.iter().map(|other| &other.name);

@@ -193,6 +193,36 @@ fn what_cannot_be_taken_is_refused_by_name_and_changes_nothing() {
 }
 
 #[test]
+fn names_that_no_edit_could_say_are_refused_with_their_line() {
+    let named = |name: &str| TEXT.replace("name = \"lamp\"", &format!("name = \"{name}\""));
+    for (name, why) in [
+        (
+            "god_object",
+            "\"god_object\" in [[scenery]] is that of the held body",
+        ),
+        ("god-object", "is that of the held body"),
+        ("coupling", "is that of the held body or of a table"),
+        ("a=b", "has an `=`"),
+        ("a\\tb", "a control character"),
+        (" a", "a blank at its ends"),
+    ] {
+        let error = Scene::parse("bench.toml", &named(name), Path::new("")).expect_err("refused");
+        let said = error.to_string();
+        let line = TEXT
+            .lines()
+            .position(|line| line.contains("lamp"))
+            .expect("a line")
+            + 1;
+        assert!(
+            said.starts_with(&format!("bench.toml:{line}: the name ")) && said.contains(why),
+            "{said}"
+        );
+    }
+    let scene = Scene::parse("bench.toml", &named("a.b ü"), Path::new("")).expect("a scene");
+    assert!(scene.edited(&["a.b ü.opacity=0.5"]).is_ok());
+}
+
+#[test]
 fn lines_end_as_they_did_and_lists_in_one_line_are_reached() {
     let text = "name = \"a\"\r\ngod_object = { shape = { sphere = { radius = 0.01 } }, mass = 1 } # held\r\nobstacle = [{ name = \"b\", shape = { plane = {} } }]\r\n";
     let scene = Scene::parse("a.toml", text, Path::new("")).expect("a scene");

@@ -164,9 +164,16 @@ fn names_that_would_be_the_same_are_told_apart() {
         ("god-object.ply", &moved(part(), [0.1, 0.0, 0.0])),
     ]);
     std::fs::write(parts.path("A-B.stl"), stl(&moved(part(), [0.2, 0.0, 0.0]))).unwrap();
-    let report = import(&parts.request(&["a b.ply", "god-object.ply", "A-B.stl"])).unwrap();
+    std::fs::write(
+        parts.path("coupling.ply"),
+        ply(&moved(part(), [0.3, 0.0, 0.0])),
+    )
+    .unwrap();
+    let names = ["a b.ply", "god-object.ply", "A-B.stl", "coupling.ply"];
+    let report = import(&parts.request(&names)).unwrap();
     let files: Vec<&str> = report.parts.iter().map(|p| p.mesh_file.as_str()).collect();
-    assert_eq!(files, ["a-b.ply", "god-object-2.ply", "A-B-2.ply"]);
+    let written = ["a-b.ply", "god-object-2.ply", "A-B-2.ply", "coupling-2.ply"];
+    assert_eq!(files, written);
 }
 
 #[test]
