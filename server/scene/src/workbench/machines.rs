@@ -110,6 +110,17 @@ fn complain_of(section: &Section<'_>, machine: &Machine, others: &[Machine], nam
             ),
         );
     }
+    let of_other_kind = |other: &&Machine| other.address.is_ipv4() != machine.address.is_ipv4();
+    if let Some(other) = others.iter().find(of_other_kind) {
+        complain(
+            section,
+            "address",
+            format!(
+                "{name} has the address {} and {} has {}: one of IPv4 and one of IPv6, between which nothing passes; write addresses of one kind for all",
+                machine.address, other.name, other.address
+            ),
+        );
+    }
     for (place, node) in machine.nodes.iter().enumerate() {
         let elsewhere = others.iter().find(|other| other.nodes.contains(node));
         if !named.nodes.iter().any(|known| known.name == *node) {

@@ -241,6 +241,21 @@ fn paths_are_relative_to_the_file_and_shipped_scenes_are_names() {
 }
 
 #[test]
+fn machines_that_cannot_reach_each_other_are_named() {
+    let machines = "[[machine]]\nname = \"pc\"\naddress = \"10.0.0.1\"\nserver = true\n[[machine]]\nname = \"walls\"\naddress = \"2001:db8::11\"\nnodes = [\"front\", \"table\"]\n[scene_origin]";
+    let text = SHIPPED_WORKBENCH.replacen("[scene_origin]", machines, 1);
+    let found = Workbench::parse("w.toml", &text, Path::new("")).unwrap_err();
+    let found: Vec<String> = found.problems().iter().map(ToString::to_string).collect();
+    let place = format!("w.toml:{}: ", line_of(&text, "2001:db8::11"));
+    let expected = place
+        + "walls has the address 2001:db8::11 and pc has 10.0.0.1: one of IPv4 and one of IPv6";
+    assert!(
+        found.iter().any(|said| said.starts_with(&expected)),
+        "{found:?}"
+    );
+}
+
+#[test]
 fn overrides_reach_every_key() {
     let directory = Path::new("");
     let workbench = Workbench::parse_with_overrides(

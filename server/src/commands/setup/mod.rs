@@ -175,13 +175,18 @@ fn address(
     default: IpAddr,
     taken: &[IpAddr],
 ) -> Result<IpAddr, Failure> {
-    let read = |text: &str| match text.parse::<IpAddr>() {
+    let read = |text: &str| {
+        match text.parse::<IpAddr>() {
         Ok(ip) if taken.contains(&ip) => Err("another PC has it".to_owned()),
+        Ok(ip) if taken.iter().any(|other| other.is_ipv4() != ip.is_ipv4()) => {
+            Err("the other PCs have addresses of the other kind, IPv4 or IPv6, between which nothing passes".to_owned())
+        }
         Ok(ip) if ip.is_unspecified() || ip.is_multicast() => {
             Err("that is no machine's".to_owned())
         }
         Ok(ip) => Ok(ip),
         Err(_) => Err("write an IP address such as 192.0.2.10".to_owned()),
+    }
     };
     let text = questions.text(
         what,
