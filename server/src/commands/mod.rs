@@ -1,6 +1,6 @@
 //! The sub-commands: one file or folder each, and what only they need.
 //!
-//! `taut render` and `taut bridge` are the libraries `taut-render` and `taut-bridge`; `taut check` is `taut_scene::check`.
+//! `taut render` and `taut bridge` are the libraries `taut-render` and `taut-bridge`; `taut check` is `taut_scene::check` and more.
 
 pub mod arguments;
 pub mod arm;
@@ -9,6 +9,7 @@ mod calibrate;
 #[cfg(not(feature = "render"))]
 #[path = "calibrate_absent.rs"]
 mod calibrate;
+mod check;
 mod demo;
 mod deploy;
 mod doctor;
@@ -210,7 +211,7 @@ fn arm_command(args: &ArmArgs) -> Result<ExitCode> {
 }
 
 fn check_command(args: &CheckArgs) -> Result<ExitCode> {
-    let reports = taut_scene::check(&args.files);
+    let reports = check::reports(&args.files);
     if args.json {
         print_json(&reports)?;
     } else {

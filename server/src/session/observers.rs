@@ -53,27 +53,29 @@ impl ObserverSettings {
                 "the workbench file has [zenoh] enabled, but this program was built without it; build it with --features zenoh, or set zenoh.enabled = false",
             ));
         }
-        let token = if workbench.observers.enabled {
-            if let Some(file) = &workbench.observers.token_file {
-                taut_link::check_secret_file(file).map_err(|reason| {
-                    Failure::BadInput(format!(
-                        "cannot use the token of [observers] in {}: {reason}",
-                        file.display()
-                    ))
-                })?;
-            }
-            workbench.observers.token().map_err(Failure::bad_input)?
-        } else {
-            None
-        };
         Ok(Self {
             workbench: workbench.name.clone(),
             vrpn: workbench.vrpn.clone(),
             stream: workbench.observers.clone(),
-            token,
+            token: observers_token(workbench)?,
             zenoh: workbench.zenoh.clone(),
         })
     }
+}
+
+/// The token that the workbench file names for those who look on.
+pub(crate) fn observers_token(workbench: &Workbench) -> Result<Option<String>, Failure> {
+    let observers = &workbench.observers;
+    let Some(file) = observers.token_file.as_ref().filter(|_| observers.enabled) else {
+        return Ok(None);
+    };
+    taut_link::check_secret_file(file).map_err(|reason| {
+        Failure::BadInput(format!(
+            "cannot use the token of [observers] in {}: {reason}",
+            file.display()
+        ))
+    })?;
+    observers.token().map_err(Failure::bad_input)
 }
 
 impl Outlets {

@@ -13,4 +13,4 @@ pub(crate) use door::Continuity;
 pub(crate) use page::{Facts, Moment, OperatorPage};
 pub(crate) use scene_desk::{AskedScene, SceneDesk, SceneWish};
 pub(crate) use scene_view::{Standing, objects_of};
-pub(crate) use settings::OperatorSetup;
+pub(crate) use settings::{OperatorSetup, operator_token};

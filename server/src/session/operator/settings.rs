@@ -29,20 +29,7 @@ impl OperatorSetup {
         if !wanted.enabled {
             return Ok(None);
         }
-        if let Some(file) = &wanted.token_file {
-            taut_link::check_secret_file(file).map_err(|reason| {
-                Failure::BadInput(format!(
-                    "cannot use the token of [operator] in {}: {reason}",
-                    file.display()
-                ))
-            })?;
-        }
-        let token = match wanted.token().map_err(Failure::bad_input)? {
-            Some(token) if known_to_observers(workbench, &token)? => {
-                return Err(Failure::bad_input(
-                    "the token of [operator] is that of [observers], which those who look on know; make another with: openssl rand -hex 32",
-                ));
-            }
+        let token = match operator_token(workbench)? {
             Some(token) => token,
             // What goes to a journal or a file others may read.
             None if !std::io::stderr().is_terminal() => {
@@ -62,6 +49,26 @@ impl OperatorSetup {
             },
             token_file: wanted.token_file.clone(),
         }))
+    }
+}
+
+/// The token that the workbench file names, which nobody else may know.
+pub(crate) fn operator_token(workbench: &Workbench) -> Result<Option<String>, Failure> {
+    let wanted = &workbench.operator;
+    let Some(file) = wanted.token_file.as_ref().filter(|_| wanted.enabled) else {
+        return Ok(None);
+    };
+    taut_link::check_secret_file(file).map_err(|reason| {
+        Failure::BadInput(format!(
+            "cannot use the token of [operator] in {}: {reason}",
+            file.display()
+        ))
+    })?;
+    match wanted.token().map_err(Failure::bad_input)? {
+        Some(token) if known_to_observers(workbench, &token)? => Err(Failure::bad_input(
+            "the token of [operator] is that of [observers], which those who look on know; make another with: openssl rand -hex 32",
+        )),
+        token => Ok(token),
     }
 }
 

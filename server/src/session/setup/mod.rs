@@ -3,6 +3,7 @@
 pub(crate) mod content;
 pub mod devices;
 mod fidelity;
+mod refusals;
 mod stability;
 pub mod workbench;
 
@@ -12,6 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
+pub use refusals::{Refusal, refusals};
 use taut_bridge::{Device, DeviceLimits, ExternalWrenchSettings, SafetySettings};
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};

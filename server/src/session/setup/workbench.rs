@@ -26,11 +26,11 @@ use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
 use crate::session::setup::devices::{device, input};
-use crate::session::setup::stability::{declared, judge, of_input, stiffnesses};
+use crate::session::setup::refusals::{borne, dynamics_of, few_motions};
+use crate::session::setup::stability::stiffnesses;
 use crate::session::setup::{
     ExternalSetup, LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup,
 };
-use crate::shared::contact_snapshot::MAX_MOVING;
 use crate::shared::failure::Failure;
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
@@ -80,37 +80,11 @@ pub fn session_setup(
         (None, None) => workbench.load_scene()?,
     };
     let built = scene.build()?;
-    if built.motions.len() > MAX_MOVING {
-        return Err(Failure::BadInput(format!(
-            "the scene \"{}\" has {} obstacles with a motion, but a session can tell its clients of {MAX_MOVING}; leave some `motion` out, or use `taut replay`",
-            built.name,
-            built.motions.len()
-        )));
-    }
-    let scene_hand = built.hand.as_ref().map(|hand| hand.preset);
+    few_motions(&built)?;
     let choice = driver(workbench, overrides)?;
-    let declared = match &choice {
-        Some(choice) => {
-            let by_driver = of_input(choice, built.view.display_scale, scene_hand);
-            // What the file declares is of the file's device.
-            let in_file = workbench.dynamics.filter(|_| overrides.input.is_none());
-            by_driver.map(|(dynamics, torque)| (in_file.unwrap_or(dynamics), torque))
-        }
-        None => declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)?
-            .map(|dynamics| (dynamics, true)),
-    };
-    if let Some((dynamics, renders_torque)) = declared {
-        let body = &built.world.body;
-        let judged = judge(
-            &dynamics,
-            renders_torque,
-            &built.settings,
-            body,
-            overrides.allow_unstable,
-        )?;
-        for warning in judged {
-            tracing::warn!("{warning}");
-        }
+    let declared = dynamics_of(workbench, overrides, choice.as_ref(), &built)?;
+    for warning in borne(declared, &built, overrides.allow_unstable)? {
+        tracing::warn!("{warning}");
     }
     let workbench_from_scene = workbench.workbench_from_scene(&scene);
     let content = content(&built, workbench, &workbench_from_scene)?;
@@ -182,7 +156,7 @@ pub fn session_setup(
 }
 
 /// A force from outside, with the port's own ramps.
-fn external(
+pub(super) fn external(
     workbench: &Workbench,
     overrides: &Overrides,
     workbench_from_scene: &Pose,
@@ -216,7 +190,10 @@ fn external(
 }
 
 /// The device that a driver of this process opens: the command line's, else the file's.
-fn driver(workbench: &Workbench, overrides: &Overrides) -> Result<Option<InputChoice>, Failure> {
+pub(super) fn driver(
+    workbench: &Workbench,
+    overrides: &Overrides,
+) -> Result<Option<InputChoice>, Failure> {
     if overrides.input.is_some() {
         return Ok(overrides.input.clone());
     }

@@ -1,0 +1,133 @@
+//! `taut check`: what `taut_scene::check` finds in the files, and what a session would refuse of a workbench.
+
+use std::path::Path;
+
+use taut_scene::{Document, FileKind, FileReport, Problem, Workbench};
+
+use crate::session::setup::refusals;
+
+/// Reads each file and says everything that is wrong with it.
+pub(super) fn reports<P: AsRef<Path>>(files: &[P]) -> Vec<FileReport> {
+    let mut reports = taut_scene::check(files);
+    for (report, file) in reports.iter_mut().zip(files) {
+        if report.kind == FileKind::Workbench {
+            report.problems.extend(refused(file.as_ref()));
+        }
+    }
+    reports
+}
+
+/// What a session would refuse, each with its line.
+fn refused(file: &Path) -> Vec<Problem> {
+    let Ok(workbench) = Workbench::load(file) else {
+        return Vec::new(); // told already
+    };
+    let name = file.display().to_string();
+    let text = std::fs::read_to_string(file).unwrap_or_default();
+    let document = Document::parse(&name, &text).ok();
+    refusals(&workbench)
+        .into_iter()
+        .map(|refusal| Problem {
+            file: name.clone(),
+            line: document
+                .as_ref()
+                .and_then(|document| document.line_of(refusal.table, refusal.key)),
+            text: refusal.why.to_string(),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taut_scene::SHIPPED_WORKBENCH;
+
+    fn faults(scene: &str, changes: &[(&str, &str)]) -> Vec<String> {
+        let directory = match tempfile::tempdir() {
+            Ok(directory) => directory,
+            Err(error) => panic!("{error}"),
+        };
+        let mut text = SHIPPED_WORKBENCH.to_owned();
+        for (old, new) in changes {
+            assert!(text.contains(old), "{old}");
+            text = text.replacen(old, new, 1);
+        }
+        let [file, scene_file] =
+            ["workbench.toml", "scene.toml"].map(|name| directory.path().join(name));
+        let trace = include_str!("../../scenes/moving-plate.csv");
+        for (path, text) in [
+            (&file, text.as_str()),
+            (&scene_file, scene),
+            (&directory.path().join("still.csv"), trace),
+        ] {
+            assert!(std::fs::write(path, text).is_ok());
+        }
+        let [report] = &reports(&[&file])[..] else {
+            panic!("one report of one file");
+        };
+        let folder = directory.path().display().to_string();
+        let told = report.problems.iter();
+        told.map(|problem| problem.to_string().replace(&folder, "."))
+            .collect()
+    }
+
+    const SCENE: &str = "name = \"a\"\n[god_object]\nshape = { box = { half_extents = [0.01, 0.01, 0.01] } }\nmass = 1.0\npose = { position = [0.0, 0.0, 0.5] }\n";
+    const NAMES_SCENE: (&str, &str) = ("scene = \"peg-in-a-hole\"", "scene = \"scene.toml\"");
+
+    #[test]
+    fn the_shipped_workbench_is_good_and_so_is_a_scene_of_ones_own() {
+        assert_eq!(faults("", &[]), [""; 0]);
+        assert_eq!(faults(SCENE, &[NAMES_SCENE]), [""; 0]);
+    }
+
+    #[test]
+    fn files_that_cannot_be_read_are_named_with_their_lines() {
+        let path = ("# path = \"my-hand.csv\"", "path = \"none.csv\"");
+        let strings = ("# strings = \"wb\"", "strings = \"none.toml\"");
+        let token = (
+            "enabled = false\nport = 4861",
+            "enabled = true\ntoken_file = \"none.token\"\nport = 4861",
+        );
+        for (change, line, expected) in [
+            (path, 80, "./none.csv: cannot be opened"),
+            (strings, 83, "./none.toml"),
+            (
+                token,
+                142,
+                "cannot use the token of [operator] in ./none.token",
+            ),
+        ] {
+            let told = faults("", &[change]);
+            let [told] = &told[..] else {
+                panic!("{told:?}");
+            };
+            let place = format!("./workbench.toml:{line}: ");
+            assert!(
+                told.starts_with(&place) && told.contains(expected),
+                "{told}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_a_session_cannot_bear_is_named() {
+        let stiff = format!("{SCENE}[coupling]\nk_h = 500000.0\n");
+        let moving: String = (0..13)
+            .map(|i| {
+                format!("[[obstacle]]\nname = \"plate {i}\"\nshape = {{ box = {{ half_extents = [0.01, 0.01, 0.01] }} }}\nmotion = {{ trace = \"still.csv\" }}\n")
+            })
+            .collect();
+        for (scene, expected) in [
+            (stiff, "is above the"),
+            (SCENE.to_owned() + &moving, "has 13 obstacles with a motion"),
+        ] {
+            let told = faults(&scene, &[NAMES_SCENE]);
+            assert!(
+                told.len() == 1
+                    && told[0].starts_with("./workbench.toml:10: ")
+                    && told[0].contains(expected),
+                "{told:?}"
+            );
+        }
+    }
+}
