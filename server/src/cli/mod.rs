@@ -159,6 +159,32 @@ mod tests {
     }
 
     #[test]
+    fn no_command_makes_a_file_that_is_called_like_standard_output() {
+        for words in [
+            "replay --scene a --trace b --out",
+            "export a --out",
+            "record --server a:1 --out",
+            "import a.stl --out",
+            "doctor --device wb --out",
+            "keys --out",
+            "setup --out",
+            "deploy a.toml --out",
+        ] {
+            let read = |out| {
+                let words = words.split(' ').chain([out]);
+                Cli::try_parse_from(["taut"].into_iter().chain(words))
+            };
+            let Err(error) = read("-") else {
+                panic!("{words} -");
+            };
+            assert!(error.to_string().contains("./- if"), "{error}");
+            if let Err(error) = read("./-") {
+                panic!("{error}");
+            }
+        }
+    }
+
+    #[test]
     fn the_first_steps_are_commands_that_there_are() {
         assert!(Cli::try_parse_from(["taut"]).is_ok_and(|cli| cli.command.is_none()));
         let shown = FIRST_STEPS

@@ -6,7 +6,8 @@ use clap::{Args, ValueEnum};
 use taut_scene::LengthUnit;
 
 use super::values::{
-    MOST_VIEWS, film_seconds, hole_edges, picture_size, png_file, positive_length, positive_rate,
+    MOST_VIEWS, film_seconds, hole_edges, output, picture_size, png_file, positive_length,
+    positive_rate,
 };
 
 /// Columns and example of `taut replay`.
@@ -43,7 +44,7 @@ pub struct ReplayArgs {
     )]
     pub recording: Option<PathBuf>,
     /// Where the answer goes, a CSV file; a recorded session needs none
-    #[arg(long, value_name = "O", required_unless_present = "recording")]
+    #[arg(long, value_name = "O", required_unless_present = "recording", value_parser = output())]
     pub out: Option<PathBuf>,
     /// Virtual rate of the god-object loop (default: once per row of the trace)
     #[arg(long, value_name = "HZ", value_parser = positive_rate)]
@@ -78,7 +79,7 @@ pub struct ExportArgs {
     #[arg(value_name = "RECORDING")]
     pub recording: PathBuf,
     /// Where the messages go, an MCAP file
-    #[arg(long, value_name = "FILE.mcap")]
+    #[arg(long, value_name = "FILE.mcap", value_parser = output())]
     pub out: PathBuf,
     /// Print the report as JSON on standard output
     #[arg(long)]
@@ -107,7 +108,7 @@ pub struct ImportArgs {
     #[arg(required = true, value_name = "PART")]
     pub parts: Vec<PathBuf>,
     /// The new folder for meshes and scene.toml; one that exists is refused
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "FOLDER", value_parser = output())]
     pub out: PathBuf,
     /// Unit of parts whose format names none, STL, OBJ and PLY: m, dm, cm, mm, um, inch (default: m, for parts of a size to be held); glTF is in metres
     #[arg(long, value_name = "UNIT")]
@@ -174,7 +175,7 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "NAME")]
     pub node: Option<String>,
     /// Write NODE-SCREEN.png into this folder instead of opening windows
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["fullscreen", "monitor"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["fullscreen", "monitor"], value_parser = output())]
     pub out: Option<PathBuf>,
     /// Cover the monitors, whatever the workbench file says
     #[arg(long)]
@@ -197,7 +198,7 @@ pub struct DoctorArgs {
     #[arg(long, value_name = "NAME|FILE")]
     pub device: Option<String>,
     /// Where the picture of the device's workspace goes, an SVG file (default: NAME-workspace.svg)
-    #[arg(long, value_name = "FILE.svg", requires = "device")]
+    #[arg(long, value_name = "FILE.svg", requires = "device", value_parser = output())]
     pub out: Option<PathBuf>,
     /// Print the findings as JSON on standard output
     #[arg(long)]

@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use taut_link::RejoinPolicy;
 
-use super::values::{device_text, first_port, positive_seconds, tracking_rate};
+use super::values::{device_text, first_port, output, positive_seconds, tracking_rate};
 
 /// `taut demo`.
 #[derive(Clone, Debug, Default, Args)]
@@ -45,7 +45,7 @@ pub struct DemoArgs {
     #[arg(long, value_name = "N", requires = "out")]
     pub frames: Option<u32>,
     /// Where the render clients write their pictures
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = output())]
     pub out: Option<PathBuf>,
     /// Start although the scene is stiffer than the device bears
     #[arg(long)]
@@ -123,7 +123,7 @@ pub struct RecordArgs {
     #[arg(long, value_name = "H:P")]
     pub server: String,
     /// Where the trace goes, a CSV file
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", value_parser = output())]
     pub out: PathBuf,
     /// An observer's or operator's credential, or the cluster key; else TAUT_KEY_FILE names it
     #[arg(long, value_name = "FILE")]

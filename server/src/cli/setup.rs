@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::values::output;
+
 /// `taut keys`.
 #[derive(Clone, Debug, Args)]
 #[command(
@@ -11,7 +13,7 @@ use clap::Args;
 )]
 pub struct KeysArgs {
     /// The file to make (default: cluster.key), a directory with --config; an existing file is never overwritten
-    #[arg(long, value_name = "FILE|DIR")]
+    #[arg(long, value_name = "FILE|DIR", value_parser = output())]
     pub out: Option<PathBuf>,
     /// Make credentials from this cluster key
     #[arg(long, value_name = "FILE")]
@@ -40,7 +42,7 @@ pub struct KeysArgs {
 )]
 pub struct SetupArgs {
     /// The file to write; one that is there is refused
-    #[arg(long, value_name = "FILE", default_value = "workbench.toml")]
+    #[arg(long, value_name = "FILE", default_value = "workbench.toml", value_parser = output())]
     pub out: PathBuf,
     /// Take every default, and ask nothing
     #[arg(long)]
@@ -57,7 +59,7 @@ pub struct DeployArgs {
     #[arg(value_name = "WORKBENCH.toml")]
     pub config: PathBuf,
     /// The folder of the archives, made if it is not there
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = output())]
     pub out: PathBuf,
     /// The cluster key (default: `key_file` of the workbench file)
     #[arg(long, value_name = "FILE")]
@@ -82,6 +84,6 @@ pub struct CompletionsArgs {
 #[derive(Clone, Debug, Args)]
 pub struct ManArgs {
     /// The directory; files of the same name are replaced
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = output())]
     pub out: PathBuf,
 }

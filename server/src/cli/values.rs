@@ -1,7 +1,8 @@
 //! What values of options may be, and what is said of those that may not.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use taut_scene::MAX_HOLE_EDGES;
 
 /// Most pixels of a preview's side: a poster.
@@ -54,6 +55,17 @@ pub(super) fn hole_edges(text: &str) -> Result<usize, String> {
         Ok(edges) if edges <= MAX_HOLE_EDGES => Ok(edges),
         _ => Err(format!("give a number of edges up to {MAX_HOLE_EDGES}")),
     }
+}
+
+/// Where a file or a folder is written.
+pub(super) fn output() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        if path == Path::new("-") {
+            Err("standard output takes none of this; name a file or folder, ./- if it is to be called so")
+        } else {
+            Ok(path)
+        }
+    })
 }
 
 /// A name that says what is written.
