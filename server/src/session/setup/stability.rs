@@ -20,6 +20,8 @@ use crate::shared::failure::Failure;
 
 /// Period of the haptics loop, s.
 const PERIOD_S: f64 = 1e-3;
+/// A stiffness so much above a limit, as a share of it, is at the limit: limits are sought by bisection and told with three decimals.
+const ROUNDING: f64 = 1e-5;
 
 /// What is known of the device: `None` where nothing is declared, or where no force is rendered.
 pub(super) fn declared(
@@ -173,8 +175,9 @@ pub(super) fn judge(
         };
         let held = axis(&hand).verdict();
         let released = axis(&Hand::RELEASED).verdict();
+        let above = |limit: f64| stiffness > limit * (1.0 + ROUNDING);
         let asked = format!("the scene's {what} of {stiffness:.3} {unit}");
-        if stiffness > held.stable {
+        if above(held.stable) {
             let sentence = format!(
                 "{asked} is above the {:.3} {unit} that this device bears in this hand: {}; lower coupling.k_h or the mass, or raise coupling.damping_time",
                 held.stable, held.stable_limit
@@ -185,12 +188,12 @@ pub(super) fn judge(
                 )));
             }
             warnings.push(sentence);
-        } else if stiffness > released.stable {
+        } else if above(released.stable) {
             warnings.push(format!(
                 "{asked} is stable in this hand, but not above {:.3} {unit} when the hand lets go: {}",
                 released.stable, released.stable_limit
             ));
-        } else if stiffness > held.passive {
+        } else if above(held.passive) {
             warnings.push(format!(
                 "{asked} is stable, but above the largest passive one of {:.3} {unit}: {}; it may hum",
                 held.passive, held.passive_limit
@@ -294,5 +297,34 @@ mod tests {
         let warned =
             judge(&counted, true, &scene.settings, &scene.world.body, false).expect("stable");
         assert!(warned.iter().any(|w| w.contains("encoder")), "{warned:?}");
+    }
+
+    #[test]
+    fn a_stiffness_at_the_limit_is_not_above_it() {
+        let scene = scene();
+        let (body, counted) = (
+            &scene.world.body,
+            DeviceDynamics {
+                resolution: 3e-5,
+                friction: 0.012,
+                ..light()
+            },
+        );
+        let judged = |stiffness: f64| {
+            let settings = Settings {
+                k_h: stiffness / (scene.settings.k_s * body.mass),
+                ..scene.settings
+            };
+            judge(&counted, false, &settings, body, false).expect("stable")
+        };
+        let warned = judged(1000.0);
+        let limit = warned.first().and_then(|warning| {
+            let (_, limit) = warning.split_once("passive one of ")?;
+            limit.split_once(' ')?.0.parse::<f64>().ok()
+        });
+        let limit = limit.expect("a limit");
+        // What is told has three decimals.
+        assert_eq!(judged(limit + 6e-4), [""; 0]);
+        assert_eq!(judged(limit * 1.001).len(), 1);
     }
 }
