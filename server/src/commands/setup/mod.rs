@@ -59,7 +59,7 @@ pub(super) fn run(
     }
     Ok(format!(
         "{0} is written; measure the corners of your screens and mend them there, then: taut check {0} && taut keys --out cluster.key && taut deploy {0} --master cluster.key --out deploy",
-        out.display()
+        taut_scene::shell_word(&out.display().to_string())
     ))
 }
 
