@@ -461,6 +461,24 @@ fn a_swap_is_planned_only_while_all_that_are_waited_for_know_the_time() {
     assert!(planned >= now + LEAD_NS);
 }
 
+#[test]
+fn a_node_that_lets_a_frame_pass_arrives_at_the_one_that_it_draws() {
+    let mut node = Node::new(1, 1_000_000);
+    let mut head = ReleaseHead {
+        frame: 1,
+        term: 1,
+        ..ReleaseHead::default()
+    };
+    assert!(node.release(MS, &head));
+    assert_eq!(node.turn(MS), Turn::Draw { frame: 2 });
+    head.frame = 2;
+    assert!(node.release(18 * MS, &head));
+    assert_eq!(node.turn(18 * MS), Turn::Draw { frame: 3 });
+    node.drawn(20 * MS, Drawn::default());
+    let arrives = node.message(20 * MS).map(|message| message.frame);
+    assert_eq!(arrives, Some(3));
+}
+
 /// What a node sends while it waits, from the RELEASE of the frame before on: times after that RELEASE, ns.
 fn copies(drawn_ns: u64, until_ns: u64) -> Vec<u64> {
     let mut node = Node::new(1, 0);

@@ -172,6 +172,29 @@ fn nodes_show_the_frames_that_the_barrier_releases() {
     }
 }
 
+/// One that is made for fewer frames than the least rate runs free, and draws no more than it was told to.
+#[test]
+fn a_node_below_the_least_rate_keeps_to_its_own() {
+    if !can_draw() {
+        return;
+    }
+    let server = Server::start_with(Some(MasterSettings {
+        swap: Swap::Immediate,
+        period_ns: 16_666_667,
+        slowest_ns: 50_000_000,
+    }));
+    let report = taut_render::run(RenderArgs {
+        fps: Some(2.0),
+        duration: Some(4.0),
+        ..server.args("both")
+    });
+    let report = report.expect("draws");
+    // Two a second, one in hand, and the first.
+    assert!((1..=10).contains(&report.frames), "{report:?}");
+    let measured = server.link.frame_report().unwrap_or_default();
+    assert_eq!(measured.counts.mismatches, 0, "{measured:?}");
+}
+
 /// Two screens at the same place: whatever moves between two frames, a node's pictures of one frame are the same to the last pixel.
 #[test]
 fn a_node_with_two_screens_shows_one_instant_on_both_with_a_barrier_and_without() {

@@ -120,15 +120,12 @@ impl Node {
         let newest = self.newest.as_ref();
         match (self.phase, newest) {
             (Phase::Free, _) | (_, None) => Turn::Free,
-            (Phase::Ready, Some(newest)) => {
+            // Drawing: the caller forgot to say that it was drawn, could not draw, or let the frame pass.
+            (Phase::Ready | Phase::Drawing { .. }, Some(newest)) => {
                 let (frame, rank) = (newest.frame + 1, newest.rank());
                 self.phase = Phase::Drawing { frame, rank };
                 Turn::Draw { frame }
             }
-            // The caller forgot to say that it was drawn, or could not draw: once more.
-            (Phase::Drawing { .. }, Some(newest)) => Turn::Draw {
-                frame: newest.frame + 1,
-            },
             (Phase::Waiting { frame, rank }, Some(newest)) => {
                 if newest.frame >= frame || newest.rank() > rank {
                     // Released, or overtaken: what was drawn is shown, late rather than never.

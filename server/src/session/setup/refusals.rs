@@ -22,7 +22,7 @@ pub struct Refusal {
     pub why: Failure,
 }
 
-/// Everything that [`session_setup`] would refuse of the files, without a device of this machine being opened: for `taut check`.
+/// Everything that `session_setup` would refuse of the files, without a device of this machine being opened: for `taut check`.
 pub fn refusals(workbench: &Workbench) -> Vec<Refusal> {
     let overrides = Overrides::default();
     let mut found = Vec::new();
