@@ -15,7 +15,9 @@ pub(crate) fn make_room(path: &Path) -> Result<()> {
         return Ok(());
     };
     let is_dead = if about.file_type().is_socket() {
-        UnixDatagram::unbound()?.connect(path).is_err()
+        // Another program's socket, of another type or not ours to open, fails in another way.
+        let refused = |error: Error| error.kind() == ErrorKind::ConnectionRefused;
+        UnixDatagram::unbound()?.connect(path).is_err_and(refused)
     } else if about.is_symlink() && fs::read_link(path)?.starts_with("/dev/pts") {
         !path.exists()
     } else {
@@ -58,6 +60,13 @@ mod tests {
         assert!(place.symlink_metadata().is_ok());
         assert_eq!(kind(), Ok(()));
         assert!(place.symlink_metadata().is_err());
+
+        let Ok(stream) = std::os::unix::net::UnixListener::bind(&place) else {
+            panic!("no socket");
+        };
+        assert_eq!(kind(), Err(ErrorKind::AddrInUse), "of another program");
+        drop(stream);
+        assert!(fs::remove_file(&place).is_ok());
 
         assert!(std::os::unix::fs::symlink("/dev/pts/999999", &place).is_ok());
         assert_eq!(kind(), Ok(()));
