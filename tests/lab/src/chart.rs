@@ -59,6 +59,20 @@ fn point(outcome: &Outcome) -> (f64, f64) {
     (outcome.load.core, outcome.worst(Measure::JndP95))
 }
 
+/// Least and largest J over the start phases.
+fn band(outcome: &Outcome) -> [f64; 2] {
+    let felt = || {
+        outcome
+            .phases
+            .iter()
+            .map(|phase| phase.get(Measure::JndP95))
+    };
+    [
+        felt().fold(f64::INFINITY, f64::min),
+        felt().fold(f64::NEG_INFINITY, f64::max),
+    ]
+}
+
 /// Whether every row of an outcome is passed.
 fn passes(outcome: &Outcome, rows: &[Row]) -> bool {
     let of_it = |row: &&Row| {
@@ -105,6 +119,7 @@ pub(crate) fn panel(
         let size = RATES.iter().position(|rate| *rate == outcome.rate);
         Mark {
             place: point(outcome),
+            band: band(outcome),
             colour: colour(outcome.method),
             size: SIZES[size.unwrap_or(0)],
             passes: passes(outcome, rows),
@@ -135,7 +150,7 @@ fn write_canonical(
     let (head, grid) = root.split_vertically(CANONICAL_HEAD);
     let lines_of_head = [
         "Error felt against the share of one core that a method takes, all its loops",
-        "down is better, left is cheaper; dot: every pass line is kept, cross: one is missed; black line: Pareto front",
+        "down is better, left is cheaper; dot: every pass line is kept, cross: one is missed; bar: from the luckiest start phase to the worst; black line: Pareto front",
     ];
     for (index, text) in lines_of_head.iter().enumerate() {
         let size = [19, 14][index];
@@ -182,7 +197,7 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
     )?;
     let (legend, grid) = root.split_vertically(50);
     draw_legend(&legend)?;
-    let mut csv = format!("panel,{KEYS},held_hz,j_p95,core_share,on_front\n");
+    let mut csv = format!("panel,{KEYS},held_hz,j_p95,core_share,on_front,j_p95_luckiest_phase\n");
     for (index, (area, panel)) in grid
         .split_evenly((lines, COLUMNS))
         .iter()
@@ -205,7 +220,8 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
             let keys = keys(outcome);
             writeln!(
                 csv,
-                "{index},{keys},{held:.1},{felt:.6e},{share:.4e},{on_front}"
+                "{index},{keys},{held:.1},{felt:.6e},{share:.4e},{on_front},{:.6e}",
+                band(outcome)[0]
             )?;
         }
     }

@@ -40,6 +40,7 @@ pub mod page;
 pub mod papers;
 mod plot;
 pub mod provenance;
+pub mod reasons;
 pub mod recipe;
 pub mod recipes;
 pub mod reference;

@@ -13,6 +13,8 @@ pub(crate) const PANEL: (u32, u32) = (460, 340);
 pub(crate) struct Mark {
     /// Cost and error.
     pub(crate) place: (f64, f64),
+    /// Least and largest error over the start phases; the same twice where there is one alone.
+    pub(crate) band: [f64; 2],
     pub(crate) colour: RGBColor,
     /// Radius, pixels.
     pub(crate) size: i32,
@@ -93,6 +95,11 @@ impl Frame {
         chart.draw_series(LineSeries::new(front, BLACK.stroke_width(1)))?;
         for mark in marks {
             let place = self.shown(mark.place);
+            let band = mark.band.map(|error| self.shown((mark.place.0, error)));
+            if band[0] != band[1] {
+                let faint = mark.colour.mix(0.35).stroke_width(3);
+                chart.draw_series(LineSeries::new(band, faint))?;
+            }
             if mark.passes {
                 chart.draw_series([Circle::new(place, mark.size, mark.colour.filled())])?;
             } else {

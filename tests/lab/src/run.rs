@@ -16,7 +16,7 @@ use crate::score::{Score, scores};
 use crate::store::Store;
 use crate::study::Study;
 use crate::sweeps::{self, Point, Sweep};
-use crate::{chart, maps, overview, page, report};
+use crate::{chart, maps, overview, page, reasons, report};
 
 /// The rate at which this project's method must pass every recipe, Hz.
 pub const OWN_RATE: u32 = 1000;
@@ -189,6 +189,7 @@ impl Results {
             report::write(&self.rows, &self.outcomes, &self.scores, directory)?;
             chart::write(&self.rows, &self.outcomes, directory)?;
             overview::write(&self.rows, &self.outcomes, directory)?;
+            reasons::write(&self.scores, directory)?;
             if !self.traces.is_empty() {
                 std::fs::write(directory.join("traces.csv"), traces::csv(&self.traces))?;
             }

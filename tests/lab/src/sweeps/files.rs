@@ -119,6 +119,7 @@ pub(crate) fn panels(sweep: &Sweep, points: &[Point]) -> Vec<(Frame, Vec<Mark>)>
                 let (colour, label) = look(&legend, &point.setting);
                 Mark {
                     place: (point.cost, point.error),
+                    band: [point.error; 2],
                     colour,
                     size: RADIUS,
                     passes: true,

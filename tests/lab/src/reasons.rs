@@ -1,0 +1,180 @@
+//! Why cases are outside the budget, in one picture: for each method and rate, in how many cases each line was missed.
+//!
+//! A case may miss several lines, so a row may sum to more than its cases. Every number is one of [`Score::reasons`].
+
+use std::collections::BTreeSet;
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use plotters::prelude::*;
+
+use crate::chart::colour;
+use crate::clock::RATES;
+use crate::score::Score;
+
+/// Pixels: a cell, the column of names, the head with the names of the lines, the foot.
+const CELL: (i32, i32) = (82, 22);
+const NAMES: i32 = 236;
+const HEAD: i32 = 150;
+const FOOT: i32 = 30;
+/// Between the rates.
+const GAP: i32 = 30;
+/// A line that some method missed in so many cases has a column of its own; the rest have one together.
+const OWN_COLUMN: usize = 3;
+
+/// Writes `reasons.svg` and `reasons.csv`.
+pub fn write(scores: &[Score], directory: &Path) -> Result<(), Box<dyn Error>> {
+    if scores.is_empty() {
+        return Ok(());
+    }
+    let mut csv = String::from("method,rate_hz,cases,within,line,missed\n");
+    for score in scores {
+        let (method, rate) = (score.method.name(), score.rate);
+        let (cases, within) = (score.cases.len(), score.within());
+        for (line, missed) in score.reasons() {
+            writeln!(csv, "{method},{rate},{cases},{within},{line},{missed}")?;
+        }
+    }
+    std::fs::write(directory.join("reasons.csv"), csv)?;
+    std::fs::write(directory.join("reasons.svg"), svg(scores)?)?;
+    Ok(())
+}
+
+/// The lines that have a column of their own, those most missed first, and the others.
+fn lines(scores: &[Score]) -> (Vec<&'static str>, Vec<&'static str>) {
+    let names: BTreeSet<_> = (scores.iter().flat_map(Score::reasons))
+        .map(|reason| reason.0)
+        .collect();
+    let misses = |line| scores.iter().map(|s| missed(s, line)).sum::<usize>();
+    let mut lines: Vec<_> = names.into_iter().collect();
+    lines.sort_by_key(|line| std::cmp::Reverse(misses(line))); // stable: by name
+    lines
+        .into_iter()
+        .partition(|line| scores.iter().any(|s| missed(s, line) >= OWN_COLUMN))
+}
+
+fn missed(score: &Score, line: &str) -> usize {
+    score
+        .cases
+        .values()
+        .filter(|lines| lines.contains(line))
+        .count()
+}
+
+fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
+    let (lines, others) = lines(scores);
+    let of_rate = |rate: u32| scores.iter().filter(move |score| score.rate == rate);
+    let rates: Vec<u32> = RATES
+        .into_iter()
+        .rev()
+        .filter(|rate| of_rate(*rate).next().is_some())
+        .collect();
+    let height = HEAD + FOOT + scores.len() as i32 * CELL.1 + rates.len() as i32 * GAP;
+    let width = NAMES + (lines.len() as i32 + 2) * CELL.0 + 40;
+    let mut text = String::new();
+    let root =
+        SVGBackend::with_string(&mut text, (width as u32, height as u32)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let write = |text: &str, (x, y), size: i32| {
+        root.draw(&Text::new(text.to_owned(), (x, y), ("sans-serif", size)))
+    };
+    let cases = scores
+        .iter()
+        .map(|score| score.cases.len())
+        .max()
+        .unwrap_or(0);
+    write(
+        &format!("Why cases are outside the budget: lines missed, in how many of {cases} cases"),
+        (16, 8),
+        19,
+    )?;
+    write(
+        "docs/laboratory.md says what each line is; a case may miss several",
+        (16, 34),
+        14,
+    )?;
+    let column = |index: usize| NAMES + index as i32 * CELL.0;
+    write("within", (column(0) + 8, HEAD - 18), 13)?;
+    for (index, line) in lines.iter().enumerate() {
+        // Names of two or three words stand in as many lines.
+        for (word, part) in line.split('_').enumerate() {
+            let place = (column(index + 1) + 4, 62 + 14 * word as i32);
+            root.draw(&Text::new(part.to_owned(), place, ("sans-serif", 13)))?;
+        }
+    }
+    let mut y = HEAD;
+    for rate in rates {
+        write(&format!("{rate} Hz"), (16, y - 18), 15)?;
+        for score in of_rate(rate) {
+            write(score.method.name(), (28, y + 4), 14)?;
+            let all = score.cases.len().max(1);
+            let within = score.within() as f64 / all as f64;
+            let counts = lines.iter().map(|line| missed(score, line));
+            let cells = std::iter::once((
+                score.within(),
+                colour(score.method).mix(0.15 + 0.5 * within),
+            ))
+            .chain(counts.map(|count| (count, RED.mix(0.7 * count as f64 / all as f64))));
+            for (index, (count, fill)) in cells.enumerate() {
+                let (left, top) = (column(index), y);
+                let cell = [(left, top), (left + CELL.0 - 3, top + CELL.1 - 3)];
+                root.draw(&Rectangle::new(cell, fill.filled()))?;
+                if count > 0 || index == 0 {
+                    write(&count.to_string(), (left + 24, top + 3), 14)?;
+                }
+            }
+            y += CELL.1;
+        }
+        y += GAP;
+    }
+    root.present()?;
+    drop(root);
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::method::Method;
+
+    #[test]
+    fn each_line_that_was_missed_has_a_column_and_each_score_a_row() {
+        let case = |name: &str, lines: &[&'static str]| {
+            (
+                (name.to_owned(), String::new()),
+                lines.iter().copied().collect(),
+            )
+        };
+        let score = |method, cases| Score {
+            method,
+            rate: 1000,
+            held: 1000.0,
+            cases: BTreeMap::from(cases),
+        };
+        let scores = [
+            score(Method::Ours, [case("R01", &[]), case("R02", &["step"])]),
+            score(
+                Method::Penalty,
+                [
+                    case("R01", &["penetration", "step"]),
+                    case("R02", &["step"]),
+                ],
+            ),
+        ];
+        assert_eq!(lines(&scores), ["step", "penetration"]);
+        let folder = tempfile::tempdir().expect("a folder");
+        write(&scores, folder.path()).expect("written");
+        let read = |name| std::fs::read_to_string(folder.path().join(name)).expect("it is there");
+        assert_eq!(
+            read("reasons.csv"),
+            "method,rate_hz,cases,within,line,missed\nours,1000,2,1,step,1\npenalty,1000,2,0,step,2\npenalty,1000,2,0,penetration,1\n"
+        );
+        let svg = read("reasons.svg");
+        for name in ["penetration", "step", "ours", "penalty", "1000 Hz"] {
+            assert!(svg.contains(name), "{name}");
+        }
+    }
+}
