@@ -23,6 +23,7 @@ fn manifest() -> Manifest {
         complete: false,
         reason: None,
         lost: Lost::default(),
+        records: None,
     }
 }
 

@@ -17,6 +17,8 @@ pub trait Line: Sized {
     const FILE: &'static str;
     /// First line of the file.
     const HEADER: &'static str;
+    /// Name of a last column that older recordings have not.
+    const ADDED: &'static str = "";
 
     /// Appends the line, without its end.
     fn write(&self, line: &mut String);
@@ -31,7 +33,8 @@ pub trait Parse: Line {
 impl Line for HapticsRecord {
     const FILE: &'static str = "haptics.csv";
     const HEADER: &'static str =
-        "sample,t_ns,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz,buttons,faulty,fx,fy,fz,tx,ty,tz";
+        "sample,t_ns,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz,buttons,faulty,fx,fy,fz,tx,ty,tz,tick_ns";
+    const ADDED: &'static str = ",tick_ns";
 
     fn write(&self, line: &mut String) {
         first(line, self.sequence);
@@ -41,20 +44,28 @@ impl Line for HapticsRecord {
         push(line, self.buttons);
         push(line, u8::from(self.faulty));
         six(line, &self.wrench);
+        nanoseconds(line, self.tick);
     }
 }
 
 impl Parse for HapticsRecord {
     fn parse(fields: &mut Fields<'_>) -> Result<Self, String> {
-        Ok(Self {
+        let mut record = Self {
             sequence: fields.number()?,
             time: fields.time()?,
+            tick: Duration::ZERO,
             pose: fields.pose()?,
             velocity: fields.six()?,
             buttons: fields.number()?,
             faulty: fields.number::<u8>()? != 0,
             wrench: fields.six()?,
-        })
+        };
+        record.tick = if fields.is_over() {
+            record.time
+        } else {
+            fields.time()?
+        };
+        Ok(record)
     }
 }
 
@@ -200,6 +211,10 @@ impl<'a> Fields<'a> {
             header: T::HEADER.split(','),
             fields: record.iter(),
         }
+    }
+
+    fn is_over(&self) -> bool {
+        self.fields.clone().next().is_none()
     }
 
     fn text(&mut self) -> Result<(&'static str, &'a str), String> {

@@ -37,7 +37,7 @@ pub use error::RecordingError;
 #[cfg(feature = "export")]
 pub use export::{ExportReport, MovingObstacle, SceneFrames, export_mcap};
 pub use identity::identity_of;
-pub use manifest::{FORMAT, Lost, Manifest, SceneOrigin};
+pub use manifest::{FORMAT, Lost, Manifest, Records, SceneOrigin};
 pub use reader::{RecordReader, Recording};
 pub use recorder::{EventSender, Recorder, Summary};
 pub use records::{ConstraintRecord, EventRecord, ForceRecord, HapticsRecord, UpdateRecord};

@@ -29,6 +29,20 @@ pub struct Manifest {
     pub reason: Option<String>,
     /// How many records there are of each kind that can be lost.
     pub lost: Lost,
+    /// How many were written; `None` until the end, and in older recordings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub records: Option<Records>,
+}
+
+/// How many records were written, by file: one that was cut shorter afterwards is found out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Records {
+    /// Of `haptics.csv`.
+    pub haptics: u64,
+    /// Of `updates.csv`.
+    pub updates: u64,
+    /// Of `forces.csv`.
+    pub forces: u64,
 }
 
 /// Where a scene's own files are.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::columns::{Fields, Line, Parse};
 use crate::error::RecordingError;
-use crate::manifest::{FORMAT, Manifest};
+use crate::manifest::{FORMAT, Manifest, Records};
 use crate::records::{ForceRecord, HapticsRecord, UpdateRecord};
 
 /// A recording that was found to be one; its records are read as they are asked for.
@@ -69,7 +69,7 @@ impl Recording {
     /// # Errors
     /// The file cannot be read.
     pub fn haptics(&self) -> Result<RecordReader<HapticsRecord>, RecordingError> {
-        RecordReader::open(&self.directory)
+        RecordReader::open(&self.directory, self.written(|records| records.haptics))
     }
 
     /// The updates of the god-object, in their order.
@@ -77,7 +77,7 @@ impl Recording {
     /// # Errors
     /// The file cannot be read.
     pub fn updates(&self) -> Result<RecordReader<UpdateRecord>, RecordingError> {
-        RecordReader::open(&self.directory)
+        RecordReader::open(&self.directory, self.written(|records| records.updates))
     }
 
     /// The forces, in their order.
@@ -85,7 +85,12 @@ impl Recording {
     /// # Errors
     /// The file cannot be read.
     pub fn forces(&self) -> Result<RecordReader<ForceRecord>, RecordingError> {
-        RecordReader::open(&self.directory)
+        RecordReader::open(&self.directory, self.written(|records| records.forces))
+    }
+
+    /// How many records a session wrote, where it came to its end and says so.
+    fn written(&self, of: impl Fn(&Records) -> u64) -> Option<u64> {
+        self.manifest.records.as_ref().map(of)
     }
 }
 
@@ -105,11 +110,14 @@ pub struct RecordReader<T> {
     record: csv::StringRecord,
     /// Where a line ends that has no end: its last number may have more digits. Beyond every file where all lines have one.
     cut_off_at: u64,
+    /// Lines that were read, whole or not, and records that were written; a difference is told once.
+    read: u64,
+    written: Option<u64>,
     kind: PhantomData<T>,
 }
 
 impl<T: Line> RecordReader<T> {
-    fn open(directory: &Path) -> Result<Self, RecordingError> {
+    fn open(directory: &Path, written: Option<u64>) -> Result<Self, RecordingError> {
         let path = directory.join(T::FILE);
         let (file, cut_off_at) = open_lines(&path).map_err(|error| RecordingError::Read {
             path: path.clone(),
@@ -122,11 +130,13 @@ impl<T: Line> RecordReader<T> {
             .headers()
             .map(|header| header.iter().collect::<Vec<_>>().join(","));
         match found {
-            Ok(header) if header == T::HEADER => Ok(Self {
+            Ok(header) if is_header::<T>(&header) => Ok(Self {
                 path,
                 reader,
                 record: csv::StringRecord::new(),
                 cut_off_at,
+                read: 0,
+                written,
                 kind: PhantomData,
             }),
             Ok(header) => Err(RecordingError::Form {
@@ -150,8 +160,16 @@ impl<T: Parse> RecordReader<T> {
     /// # Errors
     /// A line that is not in its form, or a file that can be read no further.
     pub fn next_record(&mut self) -> Result<Option<T>, RecordingError> {
-        match self.reader.read_record(&mut self.record) {
-            Ok(false) => Ok(None),
+        let more = self.reader.read_record(&mut self.record);
+        self.read += u64::from(!matches!(more, Ok(false)));
+        match more {
+            Ok(false) => match self.written.take() {
+                Some(written) if written != self.read => Err(self.form(format!(
+                    "the file ends after {} records, but the session wrote {written}",
+                    self.read
+                ))),
+                _ => Ok(None),
+            },
             Ok(true) if self.reader.position().byte() >= self.cut_off_at => {
                 Err(self.form("the line has no end".to_owned()))
             }
@@ -179,6 +197,10 @@ impl<T: Parse> RecordReader<T> {
             _ => RecordingError::Form { path, line, text },
         }
     }
+}
+
+fn is_header<T: Line>(header: &str) -> bool {
+    header == T::HEADER || T::HEADER.strip_suffix(T::ADDED) == Some(header)
 }
 
 /// What the file holds now, and where a last line that has no end would end.

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use crate::columns::{Line, TRACE_HEADER, trace_line};
 use crate::error::RecordingError;
-use crate::manifest::{Lost, Manifest};
+use crate::manifest::{Lost, Manifest, Records};
 use crate::records::{ConstraintRecord, EventRecord, ForceRecord, HapticsRecord, UpdateRecord};
 use crate::tap::{Drain, Drains, Taps, taps};
 
@@ -47,6 +47,8 @@ pub struct Summary {
     pub updates: u64,
     /// Ticks of the haptics loop written.
     pub ticks: u64,
+    /// Forces written.
+    pub forces: u64,
     /// Records that found their queue full.
     pub lost: Lost,
     /// Why the recording is not whole.
@@ -286,6 +288,11 @@ fn write_until(
         complete: reason.is_none(),
         reason,
         lost: summary.lost,
+        records: failure.is_none().then_some(Records {
+            haptics: summary.ticks,
+            updates: summary.updates,
+            forces: summary.forces,
+        }),
         ..manifest
     };
     summary.failure = failure.or(write_manifest(directory, &manifest).err());
@@ -310,7 +317,7 @@ fn write_records(
         drain(&mut drains.constraints, |record| {
             files.constraints.put(|line| record.write(line))
         })?;
-        drain(&mut drains.forces, |record| {
+        summary.forces += drain(&mut drains.forces, |record| {
             files.forces.put(|line| record.write(line))
         })?;
         for event in events.try_iter() {

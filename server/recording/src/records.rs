@@ -13,6 +13,8 @@ pub struct HapticsRecord {
     pub sequence: u64,
     /// Session time at which the device was there.
     pub time: Duration,
+    /// Session time of the tick: later by what the device and its way take, and going on while there is no sample.
+    pub tick: Duration,
     /// Pose of the held body's own frame, world from body; the last good one where `faulty`.
     pub pose: Pose,
     /// Velocity of the reference point (m/s) and angular velocity (rad/s), world axes.

@@ -19,6 +19,7 @@ fn tick(sequence: u32, buttons: u16, faulty: bool) -> HapticsRecord {
     HapticsRecord {
         sequence: u64::from(sequence),
         time: Duration::from_nanos(1_000_000 * u64::from(sequence)),
+        tick: Duration::from_nanos(1_000_250 * u64::from(sequence)),
         pose: pose(sequence),
         velocity: Vector6::repeat(f64::from(sequence) / 7.0),
         buttons,
@@ -106,8 +107,10 @@ fn every_record_is_there_bit_by_bit_at_its_session_time() {
     assert_eq!(poses.len(), good.len());
     for ((time, PoseStamped(header, read)), sequence) in poses.into_iter().zip(good) {
         assert_eq!(read.map(f64::to_bits), numbers(&pose(sequence)));
-        assert_eq!(time, 1_000_000 * u64::from(sequence));
-        assert_eq!((header.sec, u64::from(header.nanosec)), (0, time));
+        // Logged at the tick, stamped when the device was there.
+        assert_eq!(time, 1_000_250 * u64::from(sequence));
+        let stamp = 1_000_000 * u64::from(sequence);
+        assert_eq!((header.sec, u64::from(header.nanosec)), (0, stamp));
         assert_eq!(header.frame, "world");
     }
     let twists = file.read::<SixStamped>("/device/twist");
@@ -115,7 +118,7 @@ fn every_record_is_there_bit_by_bit_at_its_session_time() {
     assert_eq!(twists[3].1.1, [5.0 / 7.0; 6]);
     let wrenches = file.read::<SixStamped>("/hand/wrench");
     assert_eq!(wrenches.len(), 5);
-    assert_eq!(wrenches[2].1.1, [1.0; 6]);
+    assert_eq!((wrenches[2].0, wrenches[2].1.1), (3_000_750, [1.0; 6]));
     assert_eq!(wrenches[2].1.0.frame, "reference_point");
     let answers = file.read::<SixStamped>("/coupling/wrench");
     assert_eq!(answers.len(), 5);
@@ -139,7 +142,7 @@ fn buttons_are_told_when_they_change() {
             (*time, axes.len(), buttons.len(), buttons[0])
         })
         .collect();
-    assert_eq!(seen, [(1_000_000, 0, 16, 0), (4_000_000, 0, 16, 1)]);
+    assert_eq!(seen, [(1_000_250, 0, 16, 0), (4_001_000, 0, 16, 1)]);
 }
 
 #[test]

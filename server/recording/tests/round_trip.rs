@@ -23,6 +23,7 @@ pub(crate) fn manifest() -> Manifest {
         complete: false,
         reason: None,
         lost: Lost::default(),
+        records: None,
     }
 }
 
@@ -107,6 +108,7 @@ fn records_come_back_bit_by_bit() {
     let tick = |time, faulty| HapticsRecord {
         sequence: 1,
         time: Duration::from_millis(time),
+        tick: Duration::from_millis(time),
         pose: pose(2),
         velocity: Vector6::zeros(),
         buttons: 1,
@@ -154,6 +156,20 @@ fn records_come_back_bit_by_bit() {
     }
     assert!(matches!(updates.next_record(), Ok(None)));
     assert!(matches!(forces.next_record(), Ok(Some(read)) if read == force));
+    // All is there, and says so; what somebody cut off afterwards is missed, at whichever end of a line.
+    assert!(matches!(forces.next_record(), Ok(None)));
+    let text = std::fs::read_to_string(path.join("forces.csv")).unwrap_or_default();
+    let header = text.lines().next().unwrap_or_default().to_owned() + "\n";
+    assert!(std::fs::write(path.join("forces.csv"), header).is_ok());
+    let mut cut = match recording.forces() {
+        Ok(cut) => cut,
+        Err(error) => panic!("{error}"),
+    };
+    let missed = cut.next_record().map_err(|error| error.to_string());
+    assert!(
+        matches!(&missed, Err(said) if said.contains("ends after 0 records, but the session wrote 1")),
+        "{missed:?}"
+    );
     // A device trace has good samples only, and strictly increasing times.
     assert_eq!(lines(&path, "device.csv").len(), 1 + 1);
     assert_eq!(lines(&path, "haptics.csv").len(), 1 + 3);

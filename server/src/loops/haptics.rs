@@ -207,14 +207,12 @@ impl HapticsLoop {
         let (external, passed) = (&mut self.external, &mut self.passed);
         let report = self.port.tick(now, |reading| {
             follow(state, known, reading, now);
-            if external.is_some() {
-                // Others are shown what the hand feels, not the contact's part of it.
-                state.felt = reading.felt.or(Some(Felt {
-                    wrench: rendered,
-                    at_edge: false,
-                    set_made: None,
-                }));
-            }
+            // Others are shown what the hand feels: not what the coupling asks for while the port leads the force down.
+            state.felt = reading.felt.or(Some(Felt {
+                wrench: rendered,
+                at_edge: false,
+                set_made: None,
+            }));
             states.publish(state);
             coupling.wake();
             // Beside a bridge that couples by itself this force is rendered by nobody.
@@ -299,6 +297,7 @@ impl HapticsLoop {
             tap.push(HapticsRecord {
                 sequence: self.state.sequence,
                 time: self.state.time,
+                tick: self.state.read,
                 pose: self.state.pose,
                 velocity: self.state.velocity,
                 buttons: self.state.buttons,
@@ -328,7 +327,6 @@ fn follow(
     state.pose = reading.sample.pose;
     state.velocity = reading.sample.velocity;
     state.buttons = reading.sample.buttons;
-    state.felt = reading.felt;
 }
 
 /// The newest wrench of the coupling, as the port takes it. One that is felt is as old as the device sample that it was computed from.

@@ -194,6 +194,7 @@ impl SampleRecording {
             complete: false,
             reason: None,
             lost: Lost::default(),
+            records: None,
         };
         let path = directory.path().join("new");
         let (mut taps, recorder) = Recorder::start(&path, manifest, "name = \"none\"\n")

@@ -129,11 +129,20 @@ fn about(manifest: &Manifest, report: &ExportReport) -> Metadata {
 /// A record that has a place in time.
 trait Timed {
     fn time(&self) -> Duration;
+
+    /// Of all times in it.
+    fn latest(&self) -> Duration {
+        self.time()
+    }
 }
 
 impl Timed for HapticsRecord {
     fn time(&self) -> Duration {
-        self.time
+        self.tick
+    }
+
+    fn latest(&self) -> Duration {
+        self.tick.max(self.time)
     }
 }
 
@@ -216,12 +225,12 @@ impl<T: Parse + Timed> WholeRecords<T> {
     fn advance(&mut self) {
         while let Some(reader) = &mut self.reader {
             match reader.next_record() {
-                Ok(Some(record)) if record.time() <= MAX_TIME => {
+                Ok(Some(record)) if record.latest() <= MAX_TIME => {
                     self.next = Some(record);
                     return;
                 }
                 Ok(Some(record)) => {
-                    let text = format!("the time is {:?}", record.time());
+                    let text = format!("the time is {:?}", record.latest());
                     self.damage.add(reader.form(text));
                 }
                 Ok(None) => self.reader = None,

@@ -80,7 +80,8 @@ impl<'a, W: Write> Topics<'a, W> {
 
     /// Where the device was, what it did, and what the hand felt.
     pub(super) fn tick(&mut self, record: &HapticsRecord) -> McapResult<()> {
-        let Some(at) = Header::new(record.time, REFERENCE_POINT) else {
+        let headers = [record.tick, record.time].map(|time| Header::new(time, REFERENCE_POINT));
+        let [Some(at), Some(sampled)] = headers else {
             return Ok(()); // its reader leaves out such times
         };
         let wrench = WrenchStamped::new(at, &record.wrench);
@@ -88,36 +89,36 @@ impl<'a, W: Write> Topics<'a, W> {
             &mut self.writer,
             &mut self.hand_wrench,
             &mut self.bytes,
-            record.time,
+            record.tick,
             &wrench,
         )?;
         if record.faulty {
             return Ok(()); // the pose is that of the tick before
         }
-        let world = at.in_frame(WORLD);
+        let world = sampled.in_frame(WORLD);
         let pose = PoseStamped::new(world, &record.pose);
         put(
             &mut self.writer,
             &mut self.device_pose,
             &mut self.bytes,
-            record.time,
+            record.tick,
             &pose,
         )?;
-        let twist = TwistStamped::new(at, &record.velocity);
+        let twist = TwistStamped::new(sampled, &record.velocity);
         put(
             &mut self.writer,
             &mut self.device_twist,
             &mut self.bytes,
-            record.time,
+            record.tick,
             &twist,
         )?;
         if self.buttons.replace(record.buttons) != Some(record.buttons) {
-            let joy = Joy::new(at.in_frame(DEVICE), record.buttons);
+            let joy = Joy::new(sampled.in_frame(DEVICE), record.buttons);
             put(
                 &mut self.writer,
                 &mut self.device_buttons,
                 &mut self.bytes,
-                record.time,
+                record.tick,
                 &joy,
             )?;
         }
@@ -131,7 +132,7 @@ impl<'a, W: Write> Topics<'a, W> {
             &mut self.writer,
             &mut self.transforms,
             &mut self.bytes,
-            record.time,
+            record.tick,
             &message,
         )
     }
