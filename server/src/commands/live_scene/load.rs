@@ -74,7 +74,7 @@ impl Loader {
         if let Some(chosen) = &chosen {
             workbench.scene.clone_from(&chosen.scene);
         }
-        let mut next = self.load_scene(workbench, None)?;
+        let mut next = self.load_scene(workbench, None, true)?;
         next.chosen = chosen;
         Ok(next)
     }
@@ -83,7 +83,7 @@ impl Loader {
     pub(super) fn choose(&self, scene: &str, edited: Option<Scene>) -> Result<Next, Failure> {
         let mut workbench = load_workbench(&self.args)?;
         let instead_of = std::mem::replace(&mut workbench.scene, scene.to_owned());
-        let mut next = self.load_scene(workbench, edited)?;
+        let mut next = self.load_scene(workbench, edited, true)?;
         next.chosen = (instead_of != scene).then(|| Chosen {
             scene: scene.to_owned(),
             instead_of,
@@ -95,16 +95,21 @@ impl Loader {
     pub(super) fn change(&self, from: &str, edited: Scene) -> Result<Next, Failure> {
         let mut workbench = load_workbench(&self.args)?;
         from.clone_into(&mut workbench.scene);
-        let mut next = self.load_scene(workbench, Some(edited))?;
-        // The files are others only when they are read.
-        (next.files, next.chosen) = (None, self.chosen.clone());
+        // The files are others only when they are read; whatever they are now, this is the scene that runs.
+        let mut next = self.load_scene(workbench, Some(edited), false)?;
+        next.chosen = self.chosen.clone();
         Ok(next)
     }
 
-    fn load_scene(&self, workbench: Workbench, edited: Option<Scene>) -> Result<Next, Failure> {
+    fn load_scene(
+        &self,
+        workbench: Workbench,
+        edited: Option<Scene>,
+        from_files: bool,
+    ) -> Result<Next, Failure> {
         // Before the scene is read: what is written meanwhile is seen.
-        let files =
-            (self.args.follow_scene).then(|| SceneWatch::new(&self.args.config, &workbench));
+        let files = (self.args.follow_scene && from_files)
+            .then(|| SceneWatch::new(&self.args.config, &workbench));
         let files = files.transpose()?;
         let is_named = self.args.scene.is_some() || self.chosen.is_some() || edited.is_some();
         let overrides = Overrides {

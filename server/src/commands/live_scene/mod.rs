@@ -101,19 +101,25 @@ impl LiveScene {
 
     /// A session of this begins.
     pub(super) fn begin(&mut self, next: &mut Next) {
-        let setup = &next.setup;
         self.revision += 1;
+        let revision = u32::try_from(self.revision).unwrap_or(u32::MAX);
+        next.setup.content.description.revision = revision;
+        let setup = &next.setup;
+        let mut scenes: Vec<String> =
+            (next.workbench.scenes().into_iter().map(str::to_owned)).collect();
+        // The scene that the workbench names stays one of them while another is chosen.
+        let named = next.chosen.as_ref().map(|chosen| &chosen.instead_of);
+        scenes.extend(named.filter(|named| !scenes.contains(named)).cloned());
         self.loader.keep(next.chosen.take(), setup);
         if let Some(files) = next.files.take() {
             self.files = Some(files);
         }
-        let all = next.workbench.scenes();
         self.running = Some(Running {
             scene: setup.scene.clone(),
             from: next.workbench.scene.clone(),
             in_file: next.in_file.clone(),
             not_kept: std::mem::take(&mut next.not_kept),
-            scenes: all.into_iter().map(str::to_owned).collect(),
+            scenes,
             why_closed: why_closed(&next.workbench, setup),
             objects: objects_of(setup),
         });
