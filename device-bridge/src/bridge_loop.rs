@@ -53,6 +53,14 @@ pub(crate) struct TickStats {
     pub(crate) max_force_age: Duration,
     pub(crate) max_force: f64,
     pub(crate) max_torque: f64,
+    /// Given to the hand beyond what it had put in, and in all, by devices that were closed since, J.
+    energy_before: [f64; 2],
+}
+
+/// What a loop has counted, for the one that comes after it.
+pub(crate) struct Past {
+    stats: TickStats,
+    passed: Option<Box<PassedWrench>>,
 }
 
 /// The device side of a session.
@@ -97,6 +105,7 @@ impl BridgeLoop {
                 max_force_age: Duration::ZERO,
                 max_force: 0.0,
                 max_torque: 0.0,
+                energy_before: [0.0; 2],
             },
             next_index: 1,
             stamps: OwnStamps::default(),
@@ -119,6 +128,27 @@ impl BridgeLoop {
 
     pub(crate) fn stats(&self) -> &TickStats {
         &self.stats
+    }
+
+    /// Closes the device; what was counted.
+    pub(crate) fn close(mut self) -> Past {
+        self.stats.energy_before = self.energy();
+        Past {
+            stats: self.stats,
+            passed: self.passed,
+        }
+    }
+
+    /// Counts on from there.
+    pub(crate) fn go_on_from(&mut self, past: Past) {
+        self.stats = past.stats;
+        self.passed = past.passed;
+    }
+
+    /// Given to the hand beyond what it had put in, and in all, J.
+    pub(crate) fn energy(&self) -> [f64; 2] {
+        let (now, before) = (self.port.energy(), self.stats.energy_before);
+        [before[0] + now.injected(), before[1] + now.delivered()]
     }
 
     /// What became of a force from outside; `None` where none is felt.

@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use taut_link::LinkError;
+use taut_link::proto::SceneDescription;
 
 use crate::choice::InputError;
+use crate::cli::BridgeArgs;
 use crate::devices::{PathError, TraceError};
 use crate::edge::OfferError;
 use crate::report::BridgeReport;
@@ -97,7 +99,7 @@ pub enum BridgeError {
     },
     /// The server came back with a scene in which the device stands elsewhere.
     #[error(
-        "the server {server} came back with another scene ({scene}): the force is zero; start this bridge again, so that the device finds its place in it"
+        "the server {server} came back with another scene ({scene}), and this device finds its place when it is opened: the force is zero; start the bridge again, strings with the grip at the centre"
     )]
     OtherScene {
         /// As given.
@@ -123,6 +125,13 @@ pub enum BridgeError {
 }
 
 impl BridgeError {
+    pub(super) fn other_scene(args: &BridgeArgs, scene: &SceneDescription) -> Self {
+        Self::OtherScene {
+            server: args.server.clone(),
+            scene: scene.name.to_string(),
+        }
+    }
+
     /// Exit code of the process: 1 failed, 2 bad input.
     #[must_use]
     pub fn exit_code(&self) -> u8 {

@@ -56,14 +56,14 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     let turns = [alive.device.clone(), alive.watch.clone()];
     let notifier = ServiceNotifier::start("the bridge runs", turns, move || asked.is_asked());
     let outcome = run_loop(args, options, end.clone(), alive, wishes, |scene| {
-        build_loop(args, &motion, scene)
+        build_loop(args, &motion, scene).map(Some)
     });
     drop(notifier);
     end.let_signals_kill();
     outcome
 }
 
-/// Runs a bridge on a device that the caller makes, once the scene is known, until `stop` is set or as [`run`] ends.
+/// Runs a bridge on a device that the caller makes, once the scene is known, until `stop` is set or as [`run`] ends; or until another scene comes.
 /// `--device`, `--hand` and `--path` of `args` are not looked at; signals and the console are the caller's.
 ///
 /// # Errors
@@ -75,15 +75,12 @@ pub fn run_device(
 ) -> Result<BridgeReport, BridgeError> {
     let options = client_options(args)?;
     let (end, alive) = (EndFlag::of(stop), Alive::default());
+    let mut make = Some(make);
     run_loop(args, options, end, alive, Arc::default(), |scene| {
         let placement = Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?;
-        let device = make(placement);
-        Ok(behind_port(
-            args,
-            device,
-            placement.reference_point,
-            &placement.start,
-        ))
+        let device = make.take().map(|make| make(placement));
+        let (point, start) = (placement.reference_point, &placement.start);
+        Ok(device.map(|device| behind_port(args, device, point, start)))
     })
 }
 
@@ -93,7 +90,7 @@ fn run_loop(
     end: EndFlag,
     alive: Alive,
     wishes: Arc<ArmSwitch>,
-    build: impl FnOnce(&SceneDescription) -> Result<BridgeLoop, BridgeError>,
+    mut build: impl FnMut(&SceneDescription) -> Result<Option<BridgeLoop>, BridgeError>,
 ) -> Result<BridgeReport, BridgeError> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
@@ -120,7 +117,8 @@ fn run_loop(
         });
     };
     let first = first?;
-    let bridge = match build(first.description()) {
+    let other_scene = || BridgeError::other_scene(args, first.description());
+    let bridge = match build(first.description()).and_then(|built| built.ok_or_else(other_scene)) {
         Ok(bridge) => bridge,
         Err(error) => {
             // Its name is free again at once.
@@ -138,6 +136,7 @@ fn run_loop(
         runtime,
         over,
         totals: Totals::new(),
+        build: &mut build,
     };
     run.sessions(first, bridge)
 }

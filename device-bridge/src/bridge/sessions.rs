@@ -68,7 +68,7 @@ enum SessionEnd {
 /// A bridge at work.
 pub(super) struct Run<'a> {
     pub(super) args: &'a BridgeArgs,
-    /// Of the first session: the device was placed in it.
+    /// The device was placed in it.
     pub(super) scene: SceneDescription,
     /// Incarnation of the server that commanded last.
     pub(super) epoch: Option<u32>,
@@ -78,7 +78,13 @@ pub(super) struct Run<'a> {
     pub(super) safety: SafetySettings,
     pub(super) wishes: Arc<ArmSwitch>,
     pub(super) totals: Totals,
+    /// Opens the device where a scene wants it; `None` where it cannot be opened twice.
+    pub(super) build: &'a mut Build<'a>,
 }
+
+/// See [`Run`].
+pub(super) type Build<'a> =
+    dyn FnMut(&SceneDescription) -> Result<Option<BridgeLoop>, BridgeError> + 'a;
 
 impl Run<'_> {
     pub(super) fn sessions(
@@ -86,21 +92,18 @@ impl Run<'_> {
         first: ClientLink,
         mut bridge: BridgeLoop,
     ) -> Result<BridgeReport, BridgeError> {
-        let mut link = Some(first);
+        let mut link = first;
         loop {
-            let Some(session) = link.take() else {
-                return Ok(self.report(&bridge, "done while the server was away"));
-            };
             self.totals.sessions += 1;
             let end;
-            (bridge, end) = self.session(session, bridge)?;
-            match end {
+            (bridge, end) = self.session(link, bridge)?;
+            let reason = match end {
                 SessionEnd::Duration => return Ok(self.report(&bridge, "done")),
                 SessionEnd::Signal => return Ok(self.report(&bridge, "stopped by a signal")),
                 SessionEnd::TraceEnded => return Ok(self.report(&bridge, "the trace ended")),
                 SessionEnd::ServerStopped if self.args.stay => {
                     tracing::info!("the server stopped: the force is zero; waiting for it");
-                    link = self.join_again("it stopped", &bridge)?;
+                    "it stopped".to_owned()
                 }
                 SessionEnd::ServerStopped => {
                     tracing::info!("the server stopped: the force is zero");
@@ -110,10 +113,49 @@ impl Run<'_> {
                     tracing::warn!(
                         "the server was lost ({reason}): the force is zero; trying again"
                     );
-                    link = self.join_again(&reason, &bridge)?;
+                    reason
                 }
+            };
+            let Some(joined) = self.join_again(&reason, &bridge)? else {
+                return Ok(self.report(&bridge, "done while the server was away"));
+            };
+            link = joined;
+            if same_place(&self.scene, link.description()) {
+                tracing::info!("joined again: the force comes back as after any silence");
+            } else {
+                bridge = match self.placed(bridge, link.description()) {
+                    Ok(placed) => placed,
+                    Err(error) => {
+                        // Its name is free again at once.
+                        self.runtime.block_on(link.leave());
+                        return Err(error);
+                    }
+                };
             }
         }
+    }
+
+    /// The device opened anew in another scene: where it stands there is known when it is opened. Strings are calibrated then, with the
+    /// grip at the centre, so a person has to hold it there.
+    fn placed(
+        &mut self,
+        bridge: BridgeLoop,
+        scene: &SceneDescription,
+    ) -> Result<BridgeLoop, BridgeError> {
+        let other_scene = || BridgeError::other_scene(self.args, scene);
+        if self.args.device.is_calibrated_when_opened() {
+            return Err(other_scene());
+        }
+        let past = bridge.close();
+        let mut placed = (self.build)(scene)?.ok_or_else(other_scene)?;
+        placed.go_on_from(past);
+        self.scene = scene.clone();
+        self.safety = *placed.port().settings();
+        tracing::info!(
+            "joined another scene ({}): the device finds its place in it anew, and the force comes back as after a restart",
+            scene.name
+        );
+        Ok(placed)
     }
 
     /// Joins again; `None` if the end comes first.
@@ -133,14 +175,7 @@ impl Run<'_> {
                     report: Box::new(report),
                 })
             }
-            Some(Ok(link)) if same_place(&self.scene, link.description()) => {
-                tracing::info!("joined again: the force comes back as after any silence");
-                Ok(Some(link))
-            }
-            Some(Ok(link)) => Err(BridgeError::OtherScene {
-                server: self.args.server.clone(),
-                scene: link.description().name.to_string(),
-            }),
+            Some(Ok(link)) => Ok(Some(link)),
         }
     }
 
@@ -270,8 +305,8 @@ impl Run<'_> {
             packets_sent: totals.packets.packets_sent,
             packets_received: totals.packets.packets_received,
             packets_lost: totals.packets.lost,
-            energy_injected_j: bridge.port().energy().injected(),
-            energy_delivered_j: bridge.port().energy().delivered(),
+            energy_injected_j: bridge.energy()[0],
+            energy_delivered_j: bridge.energy()[1],
             external_wrenches: bridge.external().map_or(0, |seen| seen.taken()),
             max_external_age_ms: bridge
                 .external()
@@ -327,7 +362,9 @@ fn edge_coupler(
         (Some(CouplingChoice::Server), _) | (None, None) => Ok(None),
         (_, Some(CouplingOffer::AtEdge(offer))) => Ok(Some(EdgeCoupler::new(offer)?)),
         (None, Some(CouplingOffer::AtServer { reason })) => {
-            tracing::info!("the server computes the force: {reason}");
+            tracing::warn!(
+                "the server computes the force, so the network's delay is in it: {reason}"
+            );
             Ok(None)
         }
         (Some(CouplingChoice::Edge), Some(CouplingOffer::AtServer { reason })) => {

@@ -41,6 +41,14 @@ pub enum DeviceChoice {
     Mouse,
 }
 
+impl DeviceChoice {
+    /// It takes itself to be at a known place when it is opened: not while somebody works with it.
+    #[must_use]
+    pub fn is_calibrated_when_opened(&self) -> bool {
+        matches!(self, Self::Input(InputChoice::Spidar(_)))
+    }
+}
+
 /// A device that is opened.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InputChoice {
