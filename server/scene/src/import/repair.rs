@@ -198,8 +198,16 @@ fn close(
     };
     let thickened = shell::thicken(mesh, thickness);
     note(findings, "thickened", &thickened.sheets, |n| {
+        let thin = if thickened.thinnest < 0.999 * thickness {
+            format!(
+                "; at creases sharper than 60 degrees the wall is only {:.3e} m thick, and grows to {thickness} m away from them",
+                thickened.thinnest
+            )
+        } else {
+            String::new()
+        };
         format!(
-            "made {n} open sheets solids of {thickness} m; their surfaces are at most {:.3e} m from the sheets",
+            "made {n} open sheets solids of {thickness} m; their surfaces are at most {:.3e} m from the sheets{thin}",
             thickened.farthest
         )
     });

@@ -17,6 +17,8 @@ pub(super) struct Thickened {
     pub(super) sheets: Places,
     /// Farthest that a vertex is from the sheet, m.
     pub(super) farthest: f64,
+    /// Least thickness of the wall at a vertex, m: less than what was asked for at creases that are sharper than the miter reaches.
+    pub(super) thinnest: f64,
 }
 
 /// Makes each open sheet a solid of this thickness, m. Parts that are closed stay.
@@ -40,6 +42,14 @@ pub(super) fn thicken(mesh: &mut RawMesh, thickness: f64) -> Thickened {
         .map(|(t, _)| *t)
         .collect();
     let ways = ways(mesh, &sheet, thickness / 2.0);
+    done.thinnest = sheet
+        .iter()
+        .flat_map(|t| {
+            let n = normal(mesh, t);
+            let ways = &ways;
+            t.iter().map(move |v| 2.0 * ways[*v as usize].dot(&n))
+        })
+        .fold(thickness, f64::min);
     // The outer copy of a vertex takes its place, the inner copy a new one.
     let mut inner = vec![u32::MAX; mesh.vertices.len()];
     for v in sheet.iter().flatten() {
@@ -65,16 +75,17 @@ pub(super) fn thicken(mesh: &mut RawMesh, thickness: f64) -> Thickened {
     done
 }
 
+fn normal(mesh: &RawMesh, t: &[u32; 3]) -> Vector3<f64> {
+    let [a, b, c] = corners(mesh, *t);
+    god_object::geometry::face_normal(&[a, b, c]).unwrap_or_default()
+}
+
 /// Where each vertex of the sheet goes, m.
 fn ways(mesh: &RawMesh, sheet: &[[u32; 3]], half: f64) -> Vec<Vector3<f64>> {
-    let normal = |t: &[u32; 3]| {
-        let [a, b, c] = corners(mesh, *t);
-        god_object::geometry::face_normal(&[a, b, c]).unwrap_or_default()
-    };
     // Weighted by the angle at the vertex: how the sheet is cut into triangles does not count.
     let mut sums = vec![Vector3::zeros(); mesh.vertices.len()];
     for t in sheet {
-        let (n, points) = (normal(t), corners(mesh, *t));
+        let (n, points) = (normal(mesh, t), corners(mesh, *t));
         for k in 0..3 {
             let (to, from) = (
                 points[(k + 1) % 3] - points[k],
@@ -96,7 +107,7 @@ fn ways(mesh: &RawMesh, sheet: &[[u32; 3]], half: f64) -> Vec<Vector3<f64>> {
         .collect();
     let mut least_cosine = vec![1.0_f64; mesh.vertices.len()];
     for t in sheet {
-        let n = normal(t);
+        let n = normal(mesh, t);
         for v in t {
             let cosine = unit[*v as usize].dot(&n);
             least_cosine[*v as usize] = least_cosine[*v as usize].min(cosine);
@@ -106,4 +117,43 @@ fn ways(mesh: &RawMesh, sheet: &[[u32; 3]], half: f64) -> Vec<Vector3<f64>> {
         .zip(&least_cosine)
         .map(|(way, cosine)| way * (half / cosine.max(1.0 / MOST_MITER)))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::*;
+
+    /// Two flaps of 30 mm that meet at this angle.
+    fn fold(degrees: f64) -> RawMesh {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let across = |x: f64, z: f64| [Point3::new(x, 0.0, z), Point3::new(x, 0.03, z)];
+        let vertices = [
+            across(0.03, 0.0),
+            across(0.0, 0.0),
+            across(0.03 * cos, 0.03 * sin),
+        ];
+        RawMesh {
+            vertices: vertices.concat(),
+            triangles: vec![[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]],
+        }
+    }
+
+    #[test]
+    fn a_crease_too_sharp_for_the_miter_is_told_as_thin() {
+        for (degrees, thinnest) in [
+            (90.0, 2e-3),
+            (61.0, 2e-3),
+            (10.0, 4e-3 * 5_f64.to_radians().sin()),
+        ] {
+            let done = thicken(&mut fold(degrees), 2e-3);
+            assert!(
+                (done.thinnest - thinnest).abs() < 1e-9,
+                "{degrees}: {} m",
+                done.thinnest
+            );
+            assert!(done.farthest <= 2e-3 + 1e-12);
+        }
+    }
 }

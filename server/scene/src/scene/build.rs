@@ -1,6 +1,7 @@
 //! From a scene to what the method works on: meshes loaded or generated, masses, settings.
 
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 
 use god_object::geometry::mass_properties;
 use god_object::spatial::{advance_pose, pose_difference};
@@ -22,6 +23,9 @@ use crate::progress::Progress;
 use crate::shapes;
 use crate::simplify::{Simplified, simplify};
 use crate::trace::DeviceTrace;
+
+/// Masses of a body that a hand may hold, kg: the stiffness goes with them, and beyond these no number of the coupling means anything.
+const MASSES: RangeInclusive<f64> = 1e-6..=1e6;
 
 /// How finely an exact primitive is drawn: 5,120 triangles, 2,304, 288.
 const DRAWN_SUBDIVISIONS: u32 = 4;
@@ -384,14 +388,12 @@ impl Scene {
             MassSpec::Mass(mass) => mass,
             MassSpec::Density(density) => density * properties.volume,
         };
-        let usable = mass.is_finite() && mass > 0.0; // false for NaN
-        if !usable {
-            return Err(spec
-                .at
-                .problem(format!(
-                    "the god-object's mass comes to {mass} kg; check density and scale"
-                ))
-                .into());
+        if !MASSES.contains(&mass) {
+            let [least, most] = [MASSES.start(), MASSES.end()];
+            let text = format!(
+                "the god-object's mass comes to {mass:e} kg, which is not between {least:e} and {most:e}; check mass, density and scale"
+            );
+            return Err(spec.at.problem(text).into());
         }
         let reference_point = match spec.reference_point {
             ReferencePoint::CenterOfMass => properties.centroid,

@@ -378,6 +378,19 @@ fn density_and_reference_point_give_mass_and_inertia_of_the_solid() {
     }
 }
 
+/// The stiffness goes with the mass: a scene of 1e-300 kg would read well and never push.
+#[test]
+fn a_mass_that_no_hand_holds_is_refused() {
+    for mass in ["mass = 1e-300", "mass = 1e12", "density = 1e-9"] {
+        let scene = parse(&changed("mass = 1.0", mass)).unwrap();
+        let found = scene.build().unwrap_err().to_string();
+        assert!(
+            found.contains("is not between 1e-6 and 1e6; check mass, density and scale"),
+            "{found}"
+        );
+    }
+}
+
 #[test]
 fn a_scene_that_is_neither_shipped_nor_a_file_lists_the_shipped_ones() {
     let found = Scene::named_or_file("peg-in-hole").unwrap_err().to_string();
