@@ -30,9 +30,11 @@ extern "C" {
 /* What open, info, read, write and close return. Any other value counts as TAUT_DEVICE_FAILED. */
 enum {
     TAUT_DEVICE_OK = 0,
-    /* read: no newer sample than the last. After 20 ms of it the device counts as lost, and the force goes. */
+    /* read: no newer sample than the last. After 20 ms of it the device counts as lost, and the force goes.
+       write: the wrench was not rendered and the motors are at zero, as after a watchdog of the device's own; the next ones begin there. */
     TAUT_DEVICE_NOTHING_NEW = 1,
-    /* read, write: there, but without a pose that may be used (not calibrated, no power). No force; calls go on. */
+    /* read, write: there, but without a pose that may be used (not calibrated, no power). Calls go on; the force fades, or after a write
+       begins at zero. */
     TAUT_DEVICE_NOT_READY = 2,
     /* Unplugged. No force; taut calls close, and open again every 0.2 s. */
     TAUT_DEVICE_GONE = 3,

@@ -30,6 +30,12 @@ pub trait Device: Send {
     /// The one caller is [`crate::DevicePort`], which has made the wrench safe; a driver still refuses what is not finite.
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>);
 
+    /// Whether the driver has taken the force away of its own accord since this was asked last: nobody wrote in time, or the device was lost. What is
+    /// written renders nothing until this was asked, so that the caller begins again at zero. `false` for a driver that never does.
+    fn let_go(&mut self) -> bool {
+        false
+    }
+
     /// Tells, before a write, when the device was read for what that write comes from, `None` where it comes from nothing; and the net work of moving
     /// obstacles on the hand so far, J. For a device at the far end of a network, which counts the age of a force and its energy from there.
     fn comes_from(&mut self, _origin: Option<Duration>, _obstacle_work: f64) {}

@@ -47,9 +47,10 @@ impl<T: FarEnd> PseudoTerminal<T> {
     /// # Errors
     /// As [`Self::start`].
     pub fn start_shared(device: Arc<Mutex<T>>, link: Option<&Path>) -> std::io::Result<Self> {
+        // First: the terminal that is opened may be the one that a dead device's link names.
+        link.map_or(Ok(()), make_room)?;
         let (master, path) = open()?;
         if let Some(link) = link {
-            make_room(link)?;
             std::os::unix::fs::symlink(&path, link)?;
         }
         let end = Arc::new(AtomicBool::new(false));
@@ -141,5 +142,36 @@ fn answer<T: FarEnd>(mut master: File, device: &Mutex<T>, end: &AtomicBool) {
         device.take(monotonic_now(), &bytes[..count], &mut out);
         drop(device);
         let _ = master.write_all(&out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Silent;
+
+    impl FarEnd for Silent {
+        fn take(&mut self, _now: Duration, _bytes: &[u8], _out: &mut Vec<u8>) {}
+    }
+
+    /// The system gives the number of a closed terminal to the next one.
+    #[test]
+    fn the_link_of_a_killed_device_is_replaced_though_its_terminal_is_opened_again() {
+        let Ok(folder) = tempfile::tempdir() else {
+            panic!("no temporary directory");
+        };
+        let link = folder.path().join("tty");
+        let Ok((master, path)) = open() else {
+            panic!("no pseudo-terminal");
+        };
+        drop(master);
+        assert!(std::os::unix::fs::symlink(&path, &link).is_ok());
+        let played = PseudoTerminal::start(Silent, Some(&link));
+        let played = played.map(|played| played.place());
+        assert!(
+            played.is_ok_and(|place| Path::new(&place) == link),
+            "{path}"
+        );
     }
 }

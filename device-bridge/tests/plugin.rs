@@ -16,7 +16,7 @@ use taut_bridge::Rearm;
 
 use crate::support::stage::{
     GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, PATIENCE,
-    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, ms, opened,
+    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, ms, no_write_jumps, opened,
 };
 
 fn here() -> &'static Path {
@@ -140,6 +140,14 @@ fn a_force_does_not_outlive_the_loop_that_wrote_it() {
     // Nobody ticks any more; the library is read and written on.
     inside.wait("zero without a write", &|| inside.get("force") == 0);
     stage.until_felt(&inside);
+}
+
+#[test]
+fn no_write_of_a_plug_in_jumps() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "HAND");
+    let inside = Loaded::of(&library);
+    no_write_jumps(&format!("plugin:{}", library.display()), &inside);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use crate::support::stage::{
     GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, PATIENCE,
-    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, opened,
+    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, no_write_jumps, opened,
 };
 
 // Of tests/python/hand.py.
@@ -23,8 +23,8 @@ const UNKNOWN_KEY: i64 = 12;
 const PRINTS: i64 = 13;
 const WRITES_TO_THE_LINK: i64 = 14;
 const WRITE_RAISES: i64 = 15;
-const PLACES: [&str; 8] = [
-    "mode", "served", "force", "torque", "after", "closes", "opens", "process",
+const PLACES: [&str; 10] = [
+    "mode", "served", "force", "torque", "after", "closes", "opens", "process", "writes", "jump",
 ];
 
 fn here() -> &'static Path {
@@ -42,7 +42,7 @@ impl Shared {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("state");
-        std::fs::write(&path, [0; 64]).expect("written");
+        std::fs::write(&path, [0; 8 * PLACES.len()]).expect("written");
         let hand = here().join("tests/python/hand.py");
         Self {
             choice: format!("python:{},state={}", hand.display(), path.display()),
@@ -183,6 +183,12 @@ fn a_force_does_not_outlive_the_loop_that_wrote_it_nor_the_bridge() {
 }
 
 #[test]
+fn no_write_of_a_device_in_python_jumps() {
+    let inside = Shared::new();
+    no_write_jumps(&inside.choice, &inside);
+}
+
+#[test]
 fn a_person_arms_a_device_in_python_again() {
     let inside = Shared::new();
     a_person_arms(&inside.choice, &inside);
@@ -249,7 +255,10 @@ fn what_does_not_fit_is_named_with_the_line_of_the_file() {
             format!("{choice},interpreter=/no/python"),
             "give the option interpreter=PATH",
         ),
-        ("python:/no/such/file.py".to_owned(), "write its whole path"),
+        (
+            "python:/no/such/file.py".to_owned(),
+            "write its whole path, python:/path/device.py",
+        ),
     ] {
         let said = opened(&choice).err().expect("it does not fit");
         assert!(said.contains(named), "{choice}: {said}");

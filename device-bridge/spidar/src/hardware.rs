@@ -30,4 +30,9 @@ pub trait StringHardware: Send {
 
     /// Commands the motors to pull with `tensions` (N, each within the geometry's limits) from `now` on.
     fn write_tensions(&mut self, now: Duration, tensions: &PerString);
+
+    /// Whether the motors have let go of the strings of their own accord since this was asked last; until it was asked they render nothing.
+    fn let_go(&mut self) -> bool {
+        false
+    }
 }

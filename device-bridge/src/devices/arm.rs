@@ -71,6 +71,11 @@ pub trait ArmPort: Send {
 
     /// Wants a force, N, the device's axes; likewise.
     fn push(&mut self, force: [f64; 3]);
+
+    /// See [`Device::let_go`].
+    fn let_go(&mut self) -> bool {
+        false
+    }
 }
 
 /// The device.
@@ -239,6 +244,10 @@ impl Device for ArmDevice {
         }
         self.port
             .push(self.in_arm(wrench.fixed_rows::<3>(0).into()).into());
+    }
+
+    fn let_go(&mut self) -> bool {
+        self.port.let_go()
     }
 }
 

@@ -137,4 +137,8 @@ impl ArmPort for Connected {
     fn push(&mut self, force: [f64; 3]) {
         self.client.command(force);
     }
+
+    fn let_go(&mut self) -> bool {
+        self.client.let_go()
+    }
 }

@@ -312,13 +312,8 @@ impl<H: StringHardware> Device for SpidarDevice<H> {
 
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>) {
         let before = self.clocked();
-        // At a fault the strings stay taut and render nothing.
-        let wanted = if self.fault.is_some() {
-            Vector6::zeros()
-        } else {
-            *wrench
-        };
-        let (force, torque) = halves(&wanted);
+        // Also at a fault, with the strings where they were: what to do then the port decides, which holds and fades.
+        let (force, torque) = halves(wrench);
         let to_frame = self.placement.world_from_frame.rotation.inverse();
         // About the grip's centre instead of G.
         let torque = torque + self.lever().cross(&force);
@@ -328,6 +323,10 @@ impl<H: StringHardware> Device for SpidarDevice<H> {
         self.tensions = Some(answer);
         self.spent.1 = self.spent.0 + self.clocked().saturating_sub(before);
         self.hardware.write_tensions(now, &answer.tensions);
+    }
+
+    fn let_go(&mut self) -> bool {
+        self.hardware.let_go()
     }
 
     /// What the last tensions render at the last pose, bounds of the motors and all; not their lag.

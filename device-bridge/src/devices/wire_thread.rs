@@ -7,11 +7,12 @@
 //! | the device's | [`WireThread::newest`], [`WireThread::command`]: no lock, no system call, no allocation            |
 //!
 //! No command outlives its reason: from [`HOLDS`] after the last write of the device's loop on [`Line::command`] has none, and a session's last
-//! word is zero.
+//! word is zero. A driver that has let go so renders nothing until the device's loop knows of it ([`WireThread::let_go`]): the next command was made
+//! for a hand that feels the last one, and would be a blow.
 
 use std::fmt::Display;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -63,10 +64,11 @@ impl WireState for ArmState {
     }
 }
 
-/// A command, and how many were written before it.
+/// A command, how many were written before it, and how often the driver had let go as far as who wrote it knew.
 #[derive(Clone, Copy, Debug, Default)]
 struct Written<C> {
     writes: u64,
+    let_go: u64,
     command: C,
 }
 
@@ -82,6 +84,9 @@ pub(crate) struct Line<S: Send, C: Send> {
     pace: Option<Pace>,
     /// When the command was taken that the next state answers.
     asked: Option<Duration>,
+    /// How often the driver has let go, and whether it has rendered a command since.
+    let_go: Arc<AtomicU64>,
+    renders: bool,
     end: Arc<AtomicBool>,
 }
 
@@ -107,15 +112,33 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
         }
     }
 
-    /// What is commanded at `now`; `None` where nobody has written within [`HOLDS`].
+    /// What is commanded at `now`; `None` where nobody has written within [`HOLDS`], or not since the driver let go.
     pub(crate) fn command(&mut self, now: Duration) -> Option<C> {
+        self.command_if(now, true)
+    }
+
+    /// The same for a driver that can render only while `can_render`; it lets go where it cannot.
+    pub(crate) fn command_if(&mut self, now: Duration, can_render: bool) -> Option<C> {
         self.asked = Some(now);
         let wanted = *self.wanted.read();
         if wanted.writes != self.seen.0 {
             self.seen = (wanted.writes, now);
         }
         let is_fresh = wanted.writes > 0 && now.saturating_sub(self.seen.1) < HOLDS;
-        is_fresh.then_some(wanted.command)
+        if !is_fresh || !can_render {
+            self.let_go();
+            return None;
+        }
+        let knows = wanted.let_go == self.let_go.load(Ordering::Acquire);
+        self.renders |= knows;
+        knows.then_some(wanted.command)
+    }
+
+    /// There is no force on the hand, though one was commanded.
+    pub(crate) fn let_go(&mut self) {
+        if std::mem::take(&mut self.renders) {
+            self.let_go.fetch_add(1, Ordering::AcqRel);
+        }
     }
 }
 
@@ -129,6 +152,7 @@ pub(crate) struct WireThread<S: Send, C: Send> {
     newest: triple_buffer::Output<S>,
     wanted: triple_buffer::Input<Written<C>>,
     next: Written<C>,
+    let_go: Arc<AtomicU64>,
     name: String,
     end: Arc<AtomicBool>,
     thread: Option<thread::JoinHandle<()>>,
@@ -146,6 +170,7 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
         let (out, newest) = triple_buffer::TripleBuffer::new(&S::default()).split();
         let (wanted, taken) = triple_buffer::TripleBuffer::new(&Written::default()).split();
         let end = Arc::new(AtomicBool::new(false));
+        let let_go = Arc::new(AtomicU64::new(0));
         let line = Line {
             state: S::default(),
             out,
@@ -153,6 +178,8 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             seen: (0, Duration::ZERO),
             pace: None,
             asked: None,
+            let_go: Arc::clone(&let_go),
+            renders: false,
             end: Arc::clone(&end),
         };
         let name = wire.name();
@@ -166,6 +193,7 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             newest,
             wanted,
             next: Written::default(),
+            let_go,
             name,
             end,
             thread: Some(thread),
@@ -182,8 +210,15 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
         self.next = Written {
             writes: self.next.writes + 1,
             command,
+            ..self.next
         };
         self.wanted.write(self.next);
+    }
+
+    /// Whether the driver has let go since this was asked last. Until then it renders no command.
+    pub(crate) fn let_go(&mut self) -> bool {
+        let let_go = self.let_go.load(Ordering::Acquire);
+        std::mem::replace(&mut self.next.let_go, let_go) != let_go
     }
 }
 
@@ -216,6 +251,10 @@ impl ArmPort for ArmThread {
     fn push(&mut self, force: [f64; 3]) {
         self.command(force);
     }
+
+    fn let_go(&mut self) -> bool {
+        self.let_go()
+    }
 }
 
 /// Asks for real time for this thread, unless `priority` is 0, and tells where it is refused.
@@ -239,6 +278,7 @@ fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
         let Err(lost) = ended else {
             return;
         };
+        line.let_go();
         line.state.lose();
         line.publish();
         // One that is lost at once, again and again, is told once.
@@ -331,6 +371,27 @@ mod tests {
         while *thread.newest() != 1 {
             thread::sleep(LOOK);
         }
+    }
+
+    #[test]
+    fn a_driver_that_has_let_go_renders_nothing_until_that_is_known() {
+        let (mut thread, said) = started();
+        assert!(!thread.let_go(), "nothing was rendered yet");
+        thread.command(2.0);
+        wait_for(&said, Some(2.0));
+        assert!(!thread.let_go());
+        wait_for(&said, None);
+        // Made for a hand that feels the 2.
+        thread.command(1.9);
+        while said.try_recv().is_ok() {}
+        for _ in 0..5 {
+            thread.command(1.9);
+            assert_eq!(said.recv_timeout(CLOSE_WITHIN), Ok(None));
+        }
+        assert!(thread.let_go());
+        thread.command(0.5);
+        wait_for(&said, Some(0.5));
+        assert!(!thread.let_go());
     }
 
     #[test]

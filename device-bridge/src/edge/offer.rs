@@ -9,7 +9,7 @@ use god_object::{
 };
 use taut_link::proto::codec::encode_onto;
 use taut_link::proto::coupling::{EdgeSine, EdgeSurface};
-use taut_link::proto::{CouplingOffer, EdgeCoupling, PoseF64};
+use taut_link::proto::{CouplingOffer, EdgeCoupling, EncodeError, PoseF64};
 
 use super::settings::{from_wire, to_wire};
 
@@ -32,11 +32,19 @@ pub enum OfferError {
     },
 }
 
-/// What a server with this world offers its bridge, `set_rate_hz` sets a second; the reason where it cannot.
-#[must_use]
-pub fn offer_of(world: &World, settings: &Settings, set_rate_hz: f64) -> CouplingOffer {
-    let at_server = |reason: String| CouplingOffer::AtServer {
-        reason: reason.into(),
+/// What a server with this world offers its bridge, `set_rate_hz` sets a second; the reason where it keeps the coupling.
+///
+/// # Errors
+/// A number of the scene that no program takes from another, by its name.
+pub fn offer_of(
+    world: &World,
+    settings: &Settings,
+    set_rate_hz: f64,
+) -> Result<CouplingOffer, EncodeError> {
+    let at_server = |reason: String| {
+        Ok(CouplingOffer::AtServer {
+            reason: reason.into(),
+        })
     };
     let settings = match to_wire(settings) {
         Ok(settings) => settings,
@@ -66,10 +74,7 @@ pub fn offer_of(world: &World, settings: &Settings, set_rate_hz: f64) -> Couplin
         set_rate_hz,
         obstacles,
     });
-    match encode_onto(&offer, &mut Vec::new()) {
-        Ok(()) => offer,
-        Err(error) => at_server(error.to_string()),
-    }
+    encode_onto(&offer, &mut Vec::new()).map(|()| offer)
 }
 
 /// How an obstacle feels; `None` where that does not travel.
@@ -251,8 +256,8 @@ mod tests {
 
     fn offered(world: &World, settings: &Settings) -> EdgeCoupling {
         match offer_of(world, settings, 1000.0) {
-            CouplingOffer::AtEdge(offer) => offer,
-            CouplingOffer::AtServer { reason } => panic!("{reason}"),
+            Ok(CouplingOffer::AtEdge(offer)) => offer,
+            other => panic!("{other:?}"),
         }
     }
 
@@ -272,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_height_map_too_many_rows_and_what_no_bridge_takes_stay_at_the_server() {
+    fn a_height_map_and_too_many_rows_stay_at_the_server_and_what_nobody_takes_is_refused() {
         let (mut world, settings) = scene();
         let many = Settings {
             max_constraints: MAX_SET_ROWS + 1,
@@ -280,17 +285,15 @@ mod tests {
         };
         assert!(matches!(
             offer_of(&world, &many, 1000.0),
-            CouplingOffer::AtServer { .. }
+            Ok(CouplingOffer::AtServer { .. })
         ));
         let stiff = Settings {
             k_h: 1e13,
             ..settings
         };
-        let CouplingOffer::AtServer { reason } = offer_of(&world, &stiff, 1000.0) else {
-            panic!("nobody would take it");
-        };
+        let refused = offer_of(&world, &stiff, 1000.0).expect_err("nobody would take it");
         assert!(
-            reason
+            refused
                 .to_string()
                 .contains("EdgeSettings.k_h out of its range")
         );
@@ -304,7 +307,7 @@ mod tests {
         });
         assert!(matches!(
             offer_of(&world, &settings, 1000.0),
-            CouplingOffer::AtServer { .. }
+            Ok(CouplingOffer::AtServer { .. })
         ));
     }
 

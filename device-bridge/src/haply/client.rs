@@ -166,7 +166,8 @@ impl Talker {
         while !line.is_over() {
             ticker.wait();
             drain(socket)?;
-            send(socket, exchange.say(line.command(monotonic_now())))?;
+            let command = line.command_if(monotonic_now(), exchange.unusable().is_none());
+            send(socket, exchange.say(command))?;
             let answer = answer(socket, exchange, line)?;
             match exchange.hear(&answer) {
                 Ok(()) => nonsense = 0,

@@ -8,10 +8,12 @@ use super::claims::Claim;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PluginError {
     /// The file.
-    #[error("there is no plug-in at {path} ({cause}); write its whole path, plugin:/path/lib.so")]
+    #[error("there is no plug-in at {path} ({cause}); write its whole path, {example}")]
     Missing {
         /// As written.
         path: PathBuf,
+        /// How one of this language is named.
+        example: &'static str,
         /// What the system says.
         cause: String,
     },

@@ -90,6 +90,7 @@ impl PluginLibrary {
     fn load(path: &Path) -> Result<Self, PluginError> {
         let whole = path.canonicalize().map_err(|error| PluginError::Missing {
             path: path.to_owned(),
+            example: "plugin:/path/lib.so",
             cause: error.to_string(),
         })?;
         // SAFETY: the user names the library as trusted code; its initialisers run here, in the one thread that calls it.

@@ -57,6 +57,7 @@ impl PythonFile {
             interpreter: interpreter.to_owned(),
             path: path.canonicalize().map_err(|error| PluginError::Missing {
                 path: path.to_owned(),
+                example: "python:/path/device.py",
                 cause: error.to_string(),
             })?,
             options,

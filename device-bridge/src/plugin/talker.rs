@@ -81,6 +81,10 @@ impl ArmPort for Plugin {
         self.wrench[..3].copy_from_slice(&force);
         self.thread.command(self.wrench);
     }
+
+    fn let_go(&mut self) -> bool {
+        self.thread.let_go()
+    }
 }
 
 /// The thread's own.
@@ -168,14 +172,18 @@ impl Calls {
             if !info.has_motors {
                 continue;
             }
-            let wrench = wrench(line);
             let at_write = monotonic_now();
-            let answer = device.write(&wrench);
+            // Also without a pose: what to do then the port decides, which holds and fades.
+            let answer = device.write(&line.command(at_write).unwrap_or_default());
             self.slow(at_write);
             pace.cycle(begun);
             match answer {
-                Answer::Good | Answer::NothingNew => {}
-                Answer::NotReady => not_ready(line),
+                Answer::Good => {}
+                Answer::NothingNew => line.let_go(),
+                Answer::NotReady => {
+                    line.let_go();
+                    not_ready(line);
+                }
                 Answer::Gone | Answer::Failed(_) => return Err(device.error_text(answer)),
             }
         }
@@ -223,12 +231,4 @@ fn take(sample: &RawSample, with_orientation: bool, line: &mut PluginLine) {
 fn not_ready(line: &mut PluginLine) {
     line.state.is_usable = false;
     line.publish();
-}
-
-/// What is commanded, where the device has a pose.
-fn wrench(line: &mut PluginLine) -> [f64; 6] {
-    let has_pose = line.state.is_usable && line.state.position[0].is_finite();
-    let command = line.command(monotonic_now()).filter(|_| has_pose);
-    let finite = command.filter(|wrench| wrench.iter().all(|part| part.is_finite()));
-    finite.unwrap_or_default()
 }

@@ -123,20 +123,24 @@ class Host:
         gc.collect()
         gc.freeze()
         self.link.sendall(answer(IS_INFO, content))
-        is_zero = True
+        is_zero, let_go = True, False
         while True:
             try:
                 request = self.request()
             except socket.timeout:
                 if self.has_motors and not is_zero:
                     device.write(NO_WRENCH)
-                    is_zero = True
+                    is_zero = let_go = True
                 continue
             if request is None:
                 return  # nobody is there any more
             what, *wrench = REQUEST.unpack(request)
             if what == b"R":
                 self.link.sendall(sample(device.read(), with_orientation))
+            elif what == b"W" and let_go:
+                # It was made for a hand that feels the last one. Told, the other end begins again at zero.
+                let_go = False
+                self.link.sendall(answer(NOTHING_NEW))
             elif what == b"W":
                 is_zero = not any(wrench)
                 device.write(tuple(wrench))

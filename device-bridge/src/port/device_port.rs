@@ -215,6 +215,7 @@ impl DevicePort {
                 .tell(EventKind::PortStalled, passed.as_secs_f64());
         }
         self.motion.fade(passed);
+        self.begin_where_the_device_is();
         let reading = self.sense(now);
         let command = command(&reading);
         if let Some(command) = &command {
@@ -241,12 +242,21 @@ impl DevicePort {
     /// Lets the force come down by one period's share without reading the device; whether it is zero. For the end of a
     /// loop: call it once per period until it is true.
     pub fn release_step(&mut self, now: Duration) -> bool {
+        self.begin_where_the_device_is();
         let wrench = self.slew.step(now, &Vector6::zeros(), 0.0).wrench;
         self.device.write(now, &wrench);
         self.energy.hold(&wrench);
         self.arming.restart(CommandSource::Same);
         self.released = wrench == Vector6::zeros();
         self.released
+    }
+
+    /// Where the driver has let go the hand feels nothing, and the next write is a step from there.
+    fn begin_where_the_device_is(&mut self) {
+        if self.device.let_go() {
+            self.slew.let_go();
+            self.energy.hold(&Vector6::zeros());
+        }
     }
 
     /// Reads the device.

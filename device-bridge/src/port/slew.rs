@@ -99,6 +99,11 @@ impl SlewLimit {
         &self.rendered
     }
 
+    /// The hand feels nothing any more: the driver has let go.
+    pub(super) fn let_go(&mut self) {
+        self.rendered = Vector6::zeros();
+    }
+
     /// Moves what is rendered towards `target`, which is finite, as far as the time since the last call and the device's `speed` allow.
     pub(super) fn step(&mut self, now: Duration, target: &Vector6<f64>, speed: f64) -> Slewed {
         // A clock that goes back passes no time.

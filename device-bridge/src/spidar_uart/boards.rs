@@ -175,6 +175,10 @@ impl StringHardware for SpidarBoards {
         let digits = std::array::from_fn(|i| digit(tensions[i], self.digits_per_newton[i]));
         self.thread.command(digits);
     }
+
+    fn let_go(&mut self) -> bool {
+        self.thread.let_go()
+    }
 }
 
 type Port = Box<dyn SerialPort>;
@@ -284,8 +288,7 @@ impl Serial {
             ticker.wait();
             let now = monotonic_now();
             let is_believed = now.saturating_sub(believed) < HOLDS;
-            let digits = line.command(now).filter(|_| is_believed);
-            let digits = digits.unwrap_or_default();
+            let digits = line.command_if(now, is_believed).unwrap_or_default();
             match self.exchange(port, cycle, &digits)? {
                 Ok(raw) => {
                     if let Some(counts) = self.counters.take(monotonic_now(), &raw) {

@@ -109,8 +109,7 @@ impl Talker {
         let mut ticker = Ticker::at_phase(PERIOD, PHASE);
         while !line.is_over() {
             ticker.wait();
-            let command = line.command(monotonic_now());
-            let force = command.filter(|_| line.state.is_usable);
+            let force = line.command_if(monotonic_now(), line.state.is_usable);
             let force = Vector3::from(force.unwrap_or_default());
             let currents = self.model.currents(&self.encoders, &force);
             board.write(&HostReport::Currents(currents).bytes())?;

@@ -11,6 +11,8 @@ _Atomic long long taut_test_force;  /* upwards, what the motors render, uN */
 _Atomic long long taut_test_torque; /* about the user's x, uN m */
 _Atomic long long taut_test_after;  /* the first force after a hang, uN; -1 before */
 _Atomic long long taut_test_closes; /* closes with the force at zero */
+_Atomic long long taut_test_writes; /* forces that were written */
+_Atomic long long taut_test_jump;   /* the largest change from one to the next, uN */
 
 static double height, rising, pushed;
 
@@ -24,6 +26,10 @@ static void step(void)
 
 static void render(double force, double torque)
 {
+    long long change = (long long)(fabs(force - pushed) * 1e6);
+    if (change > taut_test_jump)
+        taut_test_jump = change;
+    taut_test_writes++;
     pushed = force;
     taut_test_force = (long long)(force * 1e6);
     taut_test_torque = (long long)(torque * 1e6);

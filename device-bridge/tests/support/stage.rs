@@ -53,6 +53,8 @@ pub fn opened(choice: &str) -> Result<Box<dyn Device>, String> {
 pub struct Stage {
     pub port: DevicePort,
     pub time: u64,
+    /// Height of a floor, m, and its stiffness, N/m.
+    pub floor: (f64, f64),
 }
 
 impl Stage {
@@ -64,16 +66,21 @@ impl Stage {
         let device = opened(choice).unwrap_or_else(|error| panic!("{error}"));
         let mut port = DevicePort::new(device, settings, Point3::origin(), &Pose::identity());
         port.restart(CommandSource::Same);
-        Self { port, time: 1000 }
+        Self {
+            port,
+            time: 1000,
+            floor: (-0.02, 200.0),
+        }
     }
 
-    /// A floor 20 mm below the start, which also turns the hand.
+    /// A floor below the start, which also turns the hand.
     pub fn tick(&mut self) -> (Option<DeviceFault>, f64) {
         self.time += 1;
         let now = ms(self.time);
+        let (floor, stiffness) = self.floor;
         let report = self.port.tick(now, |reading| {
-            let below = (-0.02 - reading.sample.pose.translation.vector.z).max(0.0);
-            let wrench = Vector6::new(0.0, 0.0, 200.0 * below, 20.0 * below, 0.0, 0.0);
+            let below = (floor - reading.sample.pose.translation.vector.z).max(0.0);
+            let wrench = Vector6::new(0.0, 0.0, stiffness * below, 20.0 * below, 0.0, 0.0);
             Some(Command::fresh(now, wrench))
         });
         (report.reading.fault, report.wrench.norm())
@@ -144,6 +151,55 @@ pub fn goes_wrong(choice: &str, inside: &dyn Inside, modes: &[(i64, &str)]) {
     }
     drop(stage);
     assert_eq!(inside.get("force"), 0, "a force stayed");
+}
+
+impl Stage {
+    /// A tick whose force the device has written before the next.
+    fn written_tick(&mut self, inside: &dyn Inside) {
+        self.tick();
+        let before = inside.get("writes");
+        inside.wait("it is written", &|| inside.get("writes") >= before + 2);
+    }
+
+    /// Until the hand feels 2 N.
+    fn until_pressed(&mut self, inside: &dyn Inside) {
+        let begun = Instant::now();
+        while inside.get("force") < 2_000_000 {
+            assert!(begun.elapsed() < PATIENCE, "nothing is felt");
+            self.written_tick(inside);
+        }
+    }
+}
+
+/// What the port promises of every write holds at the device: samples that are bad for a moment or for long make no jump there, and neither does
+/// the way back after the driver itself has let go.
+pub fn no_write_jumps(choice: &str, inside: &dyn Inside) {
+    // uN: 0.5 N/ms, and rounding.
+    const ALLOWED: i64 = 510_000;
+    let mut stage = Stage::new(choice, Rearm::Automatic);
+    stage.floor = (-0.005, 1000.0);
+    for mode in [NOT_A_NUMBER, LONG_QUATERNION, NOT_CALIBRATED, NOTHING_NEW] {
+        for ticks in [1, 3, 10, 30, 300] {
+            stage.until_pressed(inside);
+            inside.set("jump", 0);
+            inside.set("served", 0);
+            inside.set("mode", mode);
+            inside.wait("it goes wrong", &|| inside.get("served") > 0);
+            for _ in 0..ticks {
+                stage.written_tick(inside);
+            }
+            inside.set("mode", GOOD);
+            stage.until_pressed(inside);
+            let jump = inside.get("jump");
+            assert!(jump <= ALLOWED, "mode {mode} for {ticks}: {jump} uN");
+        }
+    }
+    // Nobody ticks any more.
+    inside.wait("zero without a write", &|| inside.get("force") == 0);
+    inside.set("jump", 0);
+    stage.until_pressed(inside);
+    let jump = inside.get("jump");
+    assert!(jump <= ALLOWED, "after the driver let go: {jump} uN");
 }
 
 /// A device that was gone renders nothing until a person arms it again.

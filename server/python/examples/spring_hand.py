@@ -1,4 +1,4 @@
-"""A simulated hand: a grip of 0.2 kg that a spring draws down in three seconds. Run it: taut demo --device python:spring_hand.py,depth=0.04"""
+"""A simulated hand: a grip of 0.2 kg that a spring draws down in three seconds. Run it: taut demo --device python:spring_hand.py,scale=4"""
 
 from __future__ import annotations
 
