@@ -153,14 +153,14 @@ fn what_strangers_and_clients_write_is_shown_harmless_and_audited_and_metrics_ar
             "event=\"joined\"",
             "node=alice",
             "role=operator",
-            "credential=the cluster key",
+            "credential=\"the cluster key\"",
             "address=127.0.0.1:",
         ]);
         line(&[
             "event=\"disarm\"",
             "node=alice",
             "role=operator",
-            "credential=the cluster key",
+            "credential=\"the cluster key\"",
             "address=127.0.0.1:",
         ]);
     }

@@ -51,15 +51,14 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<FloatMap, Unnamed> {
             ));
         }
     };
-    let side =
-        |text: &str| {
-            let value = text.parse::<usize>().ok();
-            value.filter(|side| (2..=MAX_SIDE).contains(side)).ok_or_else(|| {
+    let side = |text: &str| {
+        let value = text.parse::<usize>().ok();
+        value.filter(|side| (2..=MAX_SIDE).contains(side)).ok_or_else(|| {
             Unnamed::new(format!(
-                "has a side of {text} pixels, but a map has 2 to {MAX_SIDE}; save it with fewer"
+                "has a side of {text} pixels, but a map has 2 to {MAX_SIDE}; save it with so many"
             ))
         })
-        };
+    };
     let (width, height) = (side(word(&mut rest)?)?, side(word(&mut rest)?)?);
     let count = width * height;
     if count > MAX_NODES {

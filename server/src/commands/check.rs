@@ -11,30 +11,31 @@ pub(super) fn reports<P: AsRef<Path>>(files: &[P]) -> Vec<FileReport> {
     let mut reports = taut_scene::check(files);
     for (report, file) in reports.iter_mut().zip(files) {
         if report.kind == FileKind::Workbench {
-            report.problems.extend(refused(file.as_ref()));
+            let (problems, warnings) = refused(file.as_ref());
+            report.problems.extend(problems);
+            report.notes.extend(warnings);
         }
     }
     reports
 }
 
-/// What a session would refuse, each with its line.
-fn refused(file: &Path) -> Vec<Problem> {
+/// What a session would refuse, each with its line, and what it would warn of.
+fn refused(file: &Path) -> (Vec<Problem>, Vec<String>) {
     let Ok(workbench) = Workbench::load(file) else {
-        return Vec::new(); // told already
+        return Default::default(); // told already
     };
     let name = file.display().to_string();
     let text = std::fs::read_to_string(file).unwrap_or_default();
     let document = Document::parse(&name, &text).ok();
-    refusals(&workbench)
-        .into_iter()
-        .map(|refusal| Problem {
-            file: name.clone(),
-            line: document
-                .as_ref()
-                .and_then(|document| document.line_of(refusal.table, refusal.key)),
-            text: refusal.why.to_string(),
-        })
-        .collect()
+    let (refusals, warnings) = refusals(&workbench);
+    let problems = refusals.into_iter().map(|refusal| Problem {
+        file: name.clone(),
+        line: document
+            .as_ref()
+            .and_then(|document| document.line_of(refusal.table, refusal.key)),
+        text: refusal.why.to_string(),
+    });
+    (problems.collect(), warnings)
 }
 
 #[cfg(test)]
@@ -43,6 +44,11 @@ mod tests {
     use taut_scene::SHIPPED_WORKBENCH;
 
     fn faults(scene: &str, changes: &[(&str, &str)]) -> Vec<String> {
+        report(scene, changes).0
+    }
+
+    /// Problems, and notes.
+    fn report(scene: &str, changes: &[(&str, &str)]) -> (Vec<String>, Vec<String>) {
         let directory = match tempfile::tempdir() {
             Ok(directory) => directory,
             Err(error) => panic!("{error}"),
@@ -67,8 +73,8 @@ mod tests {
         };
         let folder = directory.path().display().to_string();
         let told = report.problems.iter();
-        told.map(|problem| problem.to_string().replace(&folder, "."))
-            .collect()
+        let told = told.map(|problem| problem.to_string().replace(&folder, "."));
+        (told.collect(), report.notes.clone())
     }
 
     const SCENE: &str = "name = \"a\"\n[god_object]\nshape = { box = { half_extents = [0.01, 0.01, 0.01] } }\nmass = 1.0\npose = { position = [0.0, 0.0, 0.5] }\n";
@@ -117,8 +123,12 @@ mod tests {
                 format!("[[obstacle]]\nname = \"plate {i}\"\nshape = {{ box = {{ half_extents = [0.01, 0.01, 0.01] }} }}\nmotion = {{ trace = \"still.csv\" }}\n")
             })
             .collect();
+        let sticky = format!(
+            "{SCENE}[[obstacle]]\nname = \"floor\"\nshape = {{ box = {{ half_extents = [0.01, 0.01, 0.01] }} }}\nsurface = {{ friction = 1e9 }}\n"
+        );
         for (scene, expected) in [
             (stiff, "is above the"),
+            (sticky, "EdgeSurface.friction out of its range"),
             (SCENE.to_owned() + &moving, "has 13 obstacles with a motion"),
         ] {
             let told = faults(&scene, &[NAMES_SCENE]);
@@ -129,5 +139,50 @@ mod tests {
                 "{told:?}"
             );
         }
+    }
+
+    #[test]
+    fn the_cluster_key_is_no_token() {
+        let files = tempfile::tempdir().expect("a folder");
+        let key = files.path().join("cluster.key");
+        assert!(std::fs::write(&key, "3a".repeat(32)).is_ok());
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            let mode = std::fs::Permissions::from_mode(0o600);
+            assert!(std::fs::set_permissions(&key, mode).is_ok());
+        }
+        let path = key.display();
+        let told = faults(
+            "",
+            &[
+                (
+                    "# key_file = \"cluster.key\"",
+                    &format!("key_file = \"{path}\""),
+                ),
+                (
+                    "enabled = false\nport = 4861",
+                    &format!("enabled = true\ntoken_file = \"{path}\"\nport = 4861"),
+                ),
+            ],
+        );
+        assert!(
+            told.iter()
+                .any(|told| told.contains("the token of [operator] is the cluster key")),
+            "{told:?}"
+        );
+    }
+
+    /// A session logs them when it starts; whoever checks before wants to know, too.
+    #[test]
+    fn what_a_session_warns_of_is_a_note() {
+        let stiff = format!("{SCENE}[coupling]\nk_h = 2000.0\n");
+        let (problems, notes) = report(&stiff, &[NAMES_SCENE]);
+        assert_eq!(problems, [""; 0]);
+        assert!(
+            notes.iter().any(|note| note.contains("lets go")),
+            "{notes:?}"
+        );
+        assert_eq!(report(SCENE, &[NAMES_SCENE]).1, [""; 0]);
     }
 }

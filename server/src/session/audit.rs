@@ -3,6 +3,7 @@
 //! One line per event, with its fields by name and the peer's address. It is not chatty: of the refusals of one address the first
 //! is logged at once and the others as a sum, once a minute; so is what was turned away before it had said anything.
 
+use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -67,6 +68,20 @@ impl From<&ClientStatus> for Peer {
     }
 }
 
+/// The text of a field: in quotes, unless it is one plain word, so that a line can be taken apart.
+struct Field<'a>(&'a str);
+
+impl fmt::Display for Field<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let is_plain = |c: char| c.is_alphanumeric() || "-_.:*#/".contains(c);
+        if !self.0.is_empty() && self.0.chars().all(is_plain) {
+            f.write_str(self.0)
+        } else {
+            write!(f, "{:?}", self.0)
+        }
+    }
+}
+
 /// What it showed, as `[network] revoked` names it.
 fn credential(status: &ClientStatus) -> String {
     let role = status.role;
@@ -88,14 +103,14 @@ impl Audit<'_> {
         match self {
             Self::Joined(status) => {
                 let who = Peer::from(*status);
-                record!("joined", node = %who.node, role = %who.role, credential = %who.credential, address = %who.address, session = who.session);
+                record!("joined", node = %Field(&who.node), role = %who.role, credential = %Field(&who.credential), address = %who.address, session = who.session);
             }
             Self::Left(status, reason) => {
                 let who = Peer::from(*status);
-                record!("left", node = %who.node, role = %who.role, address = %who.address, session = who.session, reason);
+                record!("left", node = %Field(&who.node), role = %who.role, address = %who.address, session = who.session, reason);
             }
             Self::Refused { address, node, why } => {
-                record!("refused", %node, %address, reason = why);
+                record!("refused", node = %Field(&node.to_string()), %address, reason = why);
             }
             Self::RefusedMore {
                 address: Some(address),
@@ -107,13 +122,13 @@ impl Audit<'_> {
             } => record!("refused", address = "many", times),
             Self::TurnedAway { times } => record!("turned-away", times),
             Self::Forbidden { who, act } => {
-                record!("forbidden", node = %who.node, role = %who.role, credential = %who.credential, address = %who.address, %act);
+                record!("forbidden", node = %Field(&who.node), role = %who.role, credential = %Field(&who.credential), address = %who.address, %act);
             }
             Self::Arm { who, arm } => {
                 let event_is = if *arm { "arm" } else { "disarm" };
-                tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node = %who.node, role = %who.role, credential = %who.credential, address = %who.address);
+                tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node = %Field(&who.node), role = %who.role, credential = %Field(&who.credential), address = %who.address);
             }
-            Self::Frames { node, what } => record!("frames", %node, what),
+            Self::Frames { node, what } => record!("frames", node = %Field(node), what),
             Self::External { what } => record!("wrench-in", what),
             Self::Port { what, is_fault } => {
                 let event_is = if *is_fault { "fault" } else { "device" };
@@ -258,7 +273,7 @@ impl PageAudit {
     /// Somebody who has shown the token changed the scene.
     pub(crate) fn edited(address: SocketAddr, revision: u64, what: &str) {
         let node = super::operator::NODE;
-        tracing::info!(target: taut_log::AUDIT_TARGET, event = "edit", node, role = %Role::Operator, credential = "the page's token", %address, revision, what = %Printable(what));
+        tracing::info!(target: taut_log::AUDIT_TARGET, event = "edit", node, role = %Role::Operator, credential = "the page's token", %address, revision, what = %Field(&Printable(what).to_string()));
     }
 
     /// Somebody was refused. Of one address and reason the first is told at once, further ones as a sum.

@@ -24,7 +24,7 @@ use crate::session::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Sever
 use crate::session::observers::ObserverServices;
 use crate::session::operator::{Continuity, Facts, OperatorPage};
 use crate::session::setup::content::own_colours;
-use crate::session::setup::{DeviceSource, SessionSetup};
+use crate::session::setup::{DeviceSource, SessionSetup, untravelled};
 use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
 use crate::shared::passed_wrench::{self, PassedReader};
@@ -71,7 +71,8 @@ impl Session {
                 &setup.world,
                 &setup.settings,
                 setup.realtime.broadcast_period.as_secs_f64().recip(),
-            ),
+            )
+            .map_err(untravelled)?,
             DeviceSource::Local(_) => CouplingOffer::AtServer {
                 reason: "its workbench has a device of its own".into(),
             },

@@ -366,8 +366,8 @@ impl Bridge {
         let edge = match mode {
             Mode::Shipped => None,
             Mode::Edge => match offer_of(&scene.world, &scene.settings, 1000.0) {
-                CouplingOffer::AtEdge(offer) => EdgeCoupler::new(&offer).ok(),
-                CouplingOffer::AtServer { reason } => panic!("{reason}"),
+                Ok(CouplingOffer::AtEdge(offer)) => EdgeCoupler::new(&offer).ok(),
+                other => panic!("{other:?}"),
             },
         };
         of.begin_session(CommandSource::Other, edge);

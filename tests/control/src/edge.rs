@@ -206,8 +206,8 @@ impl Bridge {
     fn new(task: &Task, mode: Mode) -> Self {
         let scene = &task.scene;
         let offer = match offer_of(&scene.world, &scene.settings, SET_RATE_HZ) {
-            CouplingOffer::AtEdge(offer) => offer,
-            CouplingOffer::AtServer { reason } => panic!("{reason}"),
+            Ok(CouplingOffer::AtEdge(offer)) => offer,
+            other => panic!("{other:?}"),
         };
         let coupler = match EdgeCoupler::new(&offer) {
             Ok(coupler) => coupler,

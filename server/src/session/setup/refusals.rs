@@ -1,7 +1,9 @@
 //! What a session refuses of files that read well: asked when it is set up, and by `taut check` before.
 
-use taut_bridge::InputChoice;
-use taut_scene::{BuiltScene, DeviceDynamics, Workbench};
+use taut_bridge::{InputChoice, offer_of};
+use taut_link::proto::{CouplingOffer, EncodeError};
+use taut_link::{ClusterKey, read_key_file};
+use taut_scene::{BuiltScene, Device, DeviceDynamics, Workbench};
 
 use super::devices::device;
 use super::stability::{declared, judge, of_input};
@@ -22,10 +24,12 @@ pub struct Refusal {
     pub why: Failure,
 }
 
-/// Everything that `session_setup` would refuse of the files, without a device of this machine being opened: for `taut check`.
-pub fn refusals(workbench: &Workbench) -> Vec<Refusal> {
+/// Everything that `session_setup` would refuse of the files, and what it would warn of, without a device of this machine being opened: for
+/// `taut check`.
+pub fn refusals(workbench: &Workbench) -> (Vec<Refusal>, Vec<String>) {
     let overrides = Overrides::default();
     let mut found = Vec::new();
+    let mut warnings = Vec::new();
     let mut note =
         |table, key, why| found.extend(Result::err(why).map(|why| Refusal { table, key, why }));
     note(
@@ -38,10 +42,18 @@ pub fn refusals(workbench: &Workbench) -> Vec<Refusal> {
         "token_file",
         observers_token(workbench).map(drop),
     );
+    let key_file = workbench.network.key_file.as_deref();
+    if let Some(key) = key_file.and_then(|file| read_key_file(file).ok()) {
+        note(
+            "operator",
+            "token_file",
+            no_token_is_the_key(workbench, &key),
+        );
+    }
     let scene = workbench.load_scene();
     let Ok((scene, built)) = scene.and_then(|scene| scene.build().map(|built| (scene, built)))
     else {
-        return found; // of which reading the scene tells
+        return (found, warnings); // of which reading the scene tells
     };
     let placed = workbench.workbench_from_scene(&scene);
     note(
@@ -50,10 +62,13 @@ pub fn refusals(workbench: &Workbench) -> Vec<Refusal> {
         external(workbench, &overrides, &placed).map(drop),
     );
     note("scene", "", few_motions(&built));
+    let travels = travels(&built, workbench, &overrides);
+    note("scene", "", travels.map(|told| warnings.extend(told)));
     let choice = driver(workbench, &overrides);
     match choice.and_then(|choice| dynamics_of(workbench, &overrides, choice.as_ref(), &built)) {
         Ok(declared) => {
-            note("scene", "", borne(declared, &built, false).map(drop));
+            let judged = borne(declared, &built, false);
+            note("scene", "", judged.map(|told| warnings.extend(told)));
             note(
                 "device",
                 "path",
@@ -62,7 +77,24 @@ pub fn refusals(workbench: &Workbench) -> Vec<Refusal> {
         }
         Err(why) => note("device", "strings", Err(why)),
     }
-    found
+    (found, warnings)
+}
+
+/// Refuses the cluster key as a token: a token travels in a browser's address, over plain HTTP.
+pub(super) fn no_token_is_the_key(workbench: &Workbench, key: &ClusterKey) -> Result<(), Failure> {
+    for (table, token) in [
+        ("operator", operator_token(workbench)),
+        ("observers", observers_token(workbench)),
+    ] {
+        // One that cannot be read is told of by itself.
+        let token = token.ok().flatten();
+        if token.is_some_and(|token| ClusterKey::parse(&token).is_ok_and(|it| it == *key)) {
+            return Err(Failure::BadInput(format!(
+                "the token of [{table}] is the cluster key, which would travel in a browser's address; make another with: openssl rand -hex 32"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a scene in which more moves than clients can be told of.
@@ -75,6 +107,31 @@ pub(super) fn few_motions(built: &BuiltScene) -> Result<(), Failure> {
         built.name,
         built.motions.len()
     )))
+}
+
+/// Sets a second that a bridge is offered when a scene is judged.
+const SETS_HZ: f64 = 1000.0;
+
+/// Refuses a number that no program of the cluster takes from another; a warning where the force of a device behind a network is computed here.
+pub(super) fn travels(
+    built: &BuiltScene,
+    workbench: &Workbench,
+    overrides: &Overrides,
+) -> Result<Option<String>, Failure> {
+    let offer = offer_of(&built.world, &built.settings, SETS_HZ).map_err(untravelled)?;
+    let is_remote = overrides.input.is_none() && workbench.device == Device::Remote;
+    Ok(match offer {
+        CouplingOffer::AtServer { reason } if is_remote => Some(format!(
+            "the force is computed here and not beside the device, so the network's delay is in it: {reason}"
+        )),
+        _ => None,
+    })
+}
+
+pub(in crate::session) fn untravelled(error: EncodeError) -> Failure {
+    Failure::BadInput(format!(
+        "the scene has a number that no program takes from another: {error} (docs/numbers.md)"
+    ))
 }
 
 /// What is known of the device, and whether it renders torque.

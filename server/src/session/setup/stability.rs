@@ -12,7 +12,7 @@
 use god_object::{Body, RotationMetric, Settings};
 use nalgebra::SymmetricEigen;
 use taut_bridge::{Grip, Hand, InputChoice, SpidarPlacement, string_geometry, string_grip};
-use taut_plant::stability::{DeclaredAxis, SampledLoop};
+use taut_plant::stability::{DeclaredAxis, SampledLoop, StableLimit};
 use taut_scene::{Device, DeviceDynamics, HandPreset};
 use taut_spidar::Geometry;
 
@@ -178,8 +178,12 @@ pub(super) fn judge(
         let above = |limit: f64| stiffness > limit * (1.0 + ROUNDING);
         let asked = format!("the scene's {what} of {stiffness:.3} {unit}");
         if above(held.stable) {
+            let mend = match held.stable_limit {
+                StableLimit::VirtualDamping => "lower coupling.damping_time",
+                _ => "lower coupling.k_h or the mass, or raise coupling.damping_time",
+            };
             let sentence = format!(
-                "{asked} is above the {:.3} {unit} that this device bears in this hand: {}; lower coupling.k_h or the mass, or raise coupling.damping_time",
+                "{asked} is above the {:.3} {unit} that this device bears in this hand: {}; {mend}",
                 held.stable, held.stable_limit
             );
             if !allow_unstable {
@@ -261,6 +265,17 @@ mod tests {
             judge(&light(), true, &asked(50_000.0), body, false).expect_err("far too stiff");
         assert!(refused.to_string().contains("--allow-unstable"));
         assert!(judge(&light(), true, &asked(50_000.0), body, true).is_ok_and(|w| !w.is_empty()));
+        let stuck = Settings {
+            damping_time: 1.0,
+            ..scene.settings
+        };
+        let refused = judge(&light(), true, &stuck, body, false).expect_err("too much damping");
+        assert!(
+            refused
+                .to_string()
+                .contains("; lower coupling.damping_time"),
+            "{refused}"
+        );
     }
 
     #[test]

@@ -26,7 +26,9 @@ use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
 use crate::session::setup::devices::{device, input};
-use crate::session::setup::refusals::{borne, dynamics_of, few_motions};
+use crate::session::setup::refusals::{
+    borne, dynamics_of, few_motions, no_token_is_the_key, travels,
+};
 use crate::session::setup::stability::stiffnesses;
 use crate::session::setup::{
     ExternalSetup, LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup,
@@ -81,9 +83,12 @@ pub fn session_setup(
     };
     let built = scene.build()?;
     few_motions(&built)?;
+    no_token_is_the_key(workbench, &key)?;
     let choice = driver(workbench, overrides)?;
     let declared = dynamics_of(workbench, overrides, choice.as_ref(), &built)?;
-    for warning in borne(declared, &built, overrides.allow_unstable)? {
+    let mut warnings = borne(declared, &built, overrides.allow_unstable)?;
+    warnings.extend(travels(&built, workbench, overrides)?);
+    for warning in warnings {
         tracing::warn!("{warning}");
     }
     let workbench_from_scene = workbench.workbench_from_scene(&scene);
@@ -241,6 +246,7 @@ fn recording(directory: PathBuf, scene: &Scene, built: &BuiltScene) -> Recording
             complete: false,
             reason: Some("the session did not come to its end".to_owned()),
             lost: Lost::default(),
+            records: None,
         },
         scene: source.text,
     }
