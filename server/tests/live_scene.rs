@@ -545,6 +545,14 @@ fn another_scene_is_chosen_of_those_that_the_workbench_file_names() {
     assert!(status == 409 && said.contains("no file"), "{said}");
     assert_eq!(served.ask("POST /arm", &shown).0, 200);
     served.wait_for_run("running");
+    // The one that the workbench file names stays one of them.
+    let (status, said) = served.edit(&json!({ "scene": "bench.toml" }));
+    assert_eq!(status, 200, "{said}");
+    wait_until("the bench again", || session("scene") == "bench");
+    served.wait_for_run("running");
+    let (status, said) = served.edit(&json!({ "scene": "other.toml" }));
+    assert_eq!(status, 200, "{said}");
+    wait_until("the other scene", || session("scene") == "other");
     // The workbench file names another: that counts again.
     let text = std::fs::read_to_string(served.place.path("workbench.toml")).expect("a file");
     let begun = Instant::now();

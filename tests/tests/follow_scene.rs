@@ -6,6 +6,7 @@ use std::time::Duration;
 use taut_tests::patience::wait_for;
 use taut_tests::process::Process;
 use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
+use toml::{Table, Value};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 /// Longest wait for what takes a second: a debug build on a busy machine.
@@ -97,6 +98,32 @@ fn nodes_follow_a_scene_that_is_edited_and_one_that_is_wrong_changes_nothing() {
     wait_for_lines(&mut server, "front joined", 3);
     let report = leave(node);
     assert!(report.contains("sessions: 3"), "{report}");
+    let report = server.stop();
+    assert_eq!(report["penetrations"].as_u64(), Some(0), "{report}");
+}
+
+#[test]
+fn a_bridge_follows_to_a_scene_in_which_its_body_starts_elsewhere() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.log = Some("warn,taut=info");
+    let file = workbench.write("edited.toml", scene("#c03030", 0.2));
+    workbench.set("scene", file.display().to_string());
+    let remote = Table::from_iter([("kind".to_owned(), Value::from("remote"))]);
+    workbench.set("device", remote);
+    let mut server = workbench.serve(&["--follow-scene"]);
+    let bridge = workbench.join("bridge", "bridge", &server, &["--json"]);
+    wait_for_lines(&mut server, "bridge joined as", 1);
+    let elsewhere = scene("#c03030", 0.2).replace("0.0, 0.0, 0.05", "0.02, 0.0, 0.06");
+    workbench.write("edited.toml", elsewhere);
+    wait_for_lines(&mut server, "is taken: the force fades", 1);
+    wait_for_lines(&mut server, "bridge joined as", 2);
+    wait_for("the bridge says so", LIMIT, || {
+        let said = bridge.stderr();
+        said.contains("joined another scene (edited)").then_some(())
+    });
+    bridge.interrupt();
+    let ended = bridge.end(END_LIMIT);
+    assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
     let report = server.stop();
     assert_eq!(report["penetrations"].as_u64(), Some(0), "{report}");
 }
