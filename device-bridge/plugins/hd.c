@@ -85,6 +85,7 @@ struct device {
     unsigned error;
     unsigned long long frames, taken;
     double wanted[3], written; /* N in the vendor's axes; when, s */
+    bool let_go;               /* the servo thread has rendered none since the last write */
 };
 
 static double now(void)
@@ -151,6 +152,8 @@ static unsigned servo(void *shared)
     closing = device->closing;
     if (!closing && !uncalibrated && now() - device->written <= OLDEST)
         memcpy(force, device->wanted, sizeof force);
+    else
+        device->let_go = true;
     pthread_mutex_unlock(&device->lock);
     hd.SetDoublev(HD_CURRENT_FORCE, force);
     hd.EndFrame(device->handle);
@@ -315,14 +318,21 @@ static int32_t device_read(void *opened, taut_device_sample *sample)
 static int32_t device_write(void *opened, const double wrench[6])
 {
     struct device *device = opened;
+    const double none[6] = {0};
+    bool let_go;
     pthread_mutex_lock(&device->lock);
+    /* Made for a hand that feels the last one, and it feels none: the next begins there. */
+    let_go = device->let_go;
+    device->let_go = false;
+    if (let_go)
+        wrench = none;
     /* Back to x right, y up, z towards the user. */
     device->wanted[0] = wrench[0];
     device->wanted[1] = wrench[2];
     device->wanted[2] = -wrench[1];
     device->written = now();
     pthread_mutex_unlock(&device->lock);
-    return TAUT_DEVICE_OK;
+    return let_go ? TAUT_DEVICE_NOTHING_NEW : TAUT_DEVICE_OK;
 }
 
 const taut_device_table *taut_device_entry(void)
