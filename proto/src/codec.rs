@@ -416,9 +416,15 @@ pub(crate) fn read_elements<T: Wire, const N: usize>(
     Ok(list)
 }
 
-/// Layout of a message: its fields in the order given, every number `in` its range. A number without one does not compile.
-macro_rules! wire_ranged {
-    ($name:ident { $($field:ident $(in $bounds:path)?),* $(,)? }) => {
+/// Declares a message: its fields in the order of their bytes, each number with its range behind `=>`. A number without one does not compile.
+macro_rules! wire_struct {
+    (
+        $(#[$about:meta])*
+        pub struct $name:ident { $( $(#[$what:meta])* pub $field:ident: $kind:ty $(=> $bounds:ident)? ),* $(,)? }
+    ) => {
+        $(#[$about])*
+        pub struct $name { $( $(#[$what])* pub $field: $kind, )* }
+
         impl $name {
             /// Its numbers and what each may be.
             pub const NUMBERS: &'static [$crate::range::Number] = &[ $( $(
@@ -427,22 +433,22 @@ macro_rules! wire_ranged {
         }
         impl $crate::codec::Wire for $name {
             fn write(&self, to: &mut $crate::codec::Writer<'_>) -> Result<(), $crate::EncodeError> {
-                $( $crate::codec::wire_ranged!(@write $name self to $field $(in $bounds)?); )*
+                $( $crate::codec::wire_struct!(@write $name self to $field $($bounds)?); )*
                 Ok(())
             }
             fn read(from: &mut $crate::codec::Reader<'_>) -> Result<Self, $crate::DecodeError> {
-                Ok(Self { $( $field: $crate::codec::wire_ranged!(@read $name from $field $(in $bounds)?), )* })
+                Ok(Self { $( $field: $crate::codec::wire_struct!(@read $name from $field $($bounds)?), )* })
             }
         }
     };
-    (@write $name:ident $self:ident $to:ident $field:ident in $bounds:path) => {
+    (@write $name:ident $self:ident $to:ident $field:ident $bounds:ident) => {
         const { $crate::range::Number::new(concat!(stringify!($name), ".", stringify!($field)), $bounds) }
             .write(&$self.$field, $to)?
     };
     (@write $name:ident $self:ident $to:ident $field:ident) => {
         $crate::codec::write_plain(&$self.$field, $to)?
     };
-    (@read $name:ident $from:ident $field:ident in $bounds:path) => {
+    (@read $name:ident $from:ident $field:ident $bounds:ident) => {
         const { $crate::range::Number::new(concat!(stringify!($name), ".", stringify!($field)), $bounds) }
             .read($from)?
     };
@@ -450,7 +456,7 @@ macro_rules! wire_ranged {
         $crate::codec::Wire::read($from)?
     };
 }
-pub(crate) use wire_ranged;
+pub(crate) use wire_struct;
 
 /// Writes what is no number.
 pub(crate) fn write_plain<T: Wire>(value: &T, to: &mut Writer<'_>) -> Result<(), EncodeError> {

@@ -23,7 +23,7 @@ pub use crate::role::Role;
 use crate::{
     ClientStats, CouplingOffer, DecodeError, EncodeError, EventBatch, Group, MeshHash,
     PROTOCOL_VERSION, SceneDescription, Untrusted, VersionRange,
-    codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_ranged, wire_tag},
+    codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_struct, wire_tag},
     proof::Grant,
     range::{MESH_BYTES, NAME, PORT, RATE, SESSION, SMALL, TIME, TIMEOUT},
     version::{FIRST_NEGOTIATED, MAGIC},
@@ -75,69 +75,79 @@ pub enum RefusalCode {
     ForceTaken,
 }
 
-/// First message of a client.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Hello {
-    /// Versions that the client speaks: the highest that the server speaks, too, is used.
-    pub versions: VersionRange,
-    /// Name of the node, unique among the clients.
-    pub node: Untrusted,
-    /// What it is.
-    pub role: Role,
-    /// How it wants its states.
-    pub transport: Transport,
-    /// Most states per second that it wants; 0 for all.
-    pub rate_hz: u32,
-    /// [`crate::proof::JoinSecret::client_proof`].
-    pub proof: [u8; 32],
-    /// By what right it joins: which secret the proof is of.
-    pub grant: Grant,
+wire_struct! {
+    /// First message of a client.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct Hello {
+        /// Versions that the client speaks: the highest that the server speaks, too, is used.
+        pub versions: VersionRange,
+        /// Name of the node, unique among the clients.
+        pub node: Untrusted,
+        /// What it is.
+        pub role: Role,
+        /// How it wants its states.
+        pub transport: Transport,
+        /// Most states per second that it wants; 0 for all.
+        pub rate_hz: u32 => RATE,
+        /// [`crate::proof::JoinSecret::client_proof`].
+        pub proof: [u8; 32],
+        /// By what right it joins: which secret the proof is of.
+        pub grant: Grant,
+    }
 }
 
-/// The server lets the client in.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Welcome {
-    /// Version of this session: of the frame that this is in, and of all that follows.
-    pub version: u8,
-    /// [`crate::proof::JoinSecret::server_proof`].
-    pub proof: [u8; 32],
-    /// Session number: the client's `sender` in datagram headers.
-    pub session: u16,
-    /// Epoch in datagram headers.
-    pub epoch: u32,
-    /// UDP port of the state plane, at the address that the client reached.
-    pub udp_port: u16,
-    /// Session time when this was written, ns.
-    pub session_time_ns: u64,
-    /// Silence on the hot plane after which either end gives the other up, ms.
-    pub node_timeout_ms: u32,
+wire_struct! {
+    /// The server lets the client in.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct Welcome {
+        /// Version of this session: of the frame that this is in, and of all that follows.
+        pub version: u8 => SMALL,
+        /// [`crate::proof::JoinSecret::server_proof`].
+        pub proof: [u8; 32],
+        /// Session number: the client's `sender` in datagram headers.
+        pub session: u16 => SESSION,
+        /// Epoch in datagram headers.
+        pub epoch: u32 => NAME,
+        /// UDP port of the state plane, at the address that the client reached.
+        pub udp_port: u16 => PORT,
+        /// Session time when this was written, ns.
+        pub session_time_ns: u64 => TIME,
+        /// Silence on the hot plane after which either end gives the other up, ms.
+        pub node_timeout_ms: u32 => TIMEOUT,
+    }
 }
 
-/// The server does not let the client in.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refusal {
-    /// Why, for programs.
-    pub code: RefusalCode,
-    /// Newest protocol version of the server.
-    pub version: u8,
-    /// Why and what to do, for people: one sentence.
-    pub text: Untrusted,
+wire_struct! {
+    /// The server does not let the client in.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct Refusal {
+        /// Why, for programs.
+        pub code: RefusalCode,
+        /// Newest protocol version of the server.
+        pub version: u8 => SMALL,
+        /// Why and what to do, for people: one sentence.
+        pub text: Untrusted,
+    }
 }
 
-/// Asks for a mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MeshRequest {
-    /// Which.
-    pub hash: MeshHash,
+wire_struct! {
+    /// Asks for a mesh.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct MeshRequest {
+        /// Which.
+        pub hash: MeshHash,
+    }
 }
 
-/// Answers [`MeshRequest`]; the blob's bytes follow raw on the same stream.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MeshHeader {
-    /// Which.
-    pub hash: MeshHash,
-    /// Bytes that follow; 0 if the server has no such mesh.
-    pub length: u32,
+wire_struct! {
+    /// Answers [`MeshRequest`]; the blob's bytes follow raw on the same stream.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct MeshHeader {
+        /// Which.
+        pub hash: MeshHash,
+        /// Bytes that follow; 0 if the server has no such mesh.
+        pub length: u32 => MESH_BYTES,
+    }
 }
 
 /// Weight of a [`LogEvent`].
@@ -151,36 +161,44 @@ pub enum LogLevel {
     Error,
 }
 
-/// A line for the log of the whole workbench.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LogEvent {
-    /// Weight.
-    pub level: LogLevel,
-    /// One sentence.
-    pub text: Untrusted,
+wire_struct! {
+    /// A line for the log of the whole workbench.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct LogEvent {
+        /// Weight.
+        pub level: LogLevel,
+        /// One sentence.
+        pub text: Untrusted,
+    }
 }
 
-/// An operator wants force at the device, or none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ArmRequest {
-    /// Force, or none.
-    pub arm: bool,
+wire_struct! {
+    /// An operator wants force at the device, or none.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct ArmRequest {
+        /// Force, or none.
+        pub arm: bool,
+    }
 }
 
-/// A client says how it takes its states from now on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StatesBy {
-    /// From the group, or by unicast.
-    pub multicast: bool,
-    /// It leaves the group because a member sealed a state in the server's name.
-    pub forged: bool,
+wire_struct! {
+    /// A client says how it takes its states from now on.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct StatesBy {
+        /// From the group, or by unicast.
+        pub multicast: bool,
+        /// It leaves the group because a member sealed a state in the server's name.
+        pub forged: bool,
+    }
 }
 
-/// Last words.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Bye {
-    /// Why, one sentence.
-    pub reason: Untrusted,
+wire_struct! {
+    /// Last words.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct Bye {
+        /// Why, one sentence.
+        pub reason: Untrusted,
+    }
 }
 
 /// Everything that is said on a control stream.
@@ -327,35 +345,3 @@ wire_messages! {
 wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });
 wire_tag!(RefusalCode, "refusal" { WrongKey = 0, WrongVersion = 1, NameTaken = 2, DeviceTaken = 3, Full = 4, BadHello = 5, Stopping = 6, TrackerTaken = 7, Revoked = 8, RoleClosed = 9, ForceTaken = 10 });
 wire_tag!(LogLevel, "log level" { Info = 0, Warning = 1, Error = 2 });
-wire_ranged!(Hello {
-    versions,
-    node,
-    role,
-    transport,
-    rate_hz in RATE,
-    proof,
-    grant
-});
-wire_ranged!(Welcome {
-    version in SMALL,
-    proof,
-    session in SESSION,
-    epoch in NAME,
-    udp_port in PORT,
-    session_time_ns in TIME,
-    node_timeout_ms in TIMEOUT
-});
-wire_ranged!(Refusal {
-    code,
-    version in SMALL,
-    text
-});
-wire_ranged!(MeshRequest { hash });
-wire_ranged!(MeshHeader {
-    hash,
-    length in MESH_BYTES
-});
-wire_ranged!(LogEvent { level, text });
-wire_ranged!(Bye { reason });
-wire_ranged!(ArmRequest { arm });
-wire_ranged!(StatesBy { multicast, forged });

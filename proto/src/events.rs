@@ -7,7 +7,7 @@
 //! the client takes only the very next one.
 
 use crate::{
-    codec::wire_ranged,
+    codec::wire_struct,
     range::WRAPS,
     state::{EventRecord, MAX_EVENTS},
 };
@@ -23,20 +23,24 @@ pub const MAX_QUEUED: usize = 1024;
 /// Most events in one message.
 pub const MAX_BATCH: usize = 256;
 
-/// All events after a number, on the control stream.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct EventBatch {
-    /// Number of the event before the first of these. The first message of a stream tells no event, only where the client comes in.
-    pub after: u32,
-    /// The events, in order.
-    pub records: Vec<EventRecord>,
+wire_struct! {
+    /// All events after a number, on the control stream.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct EventBatch {
+        /// Number of the event before the first of these. The first message of a stream tells no event, only where the client comes in.
+        pub after: u32 => WRAPS,
+        /// The events, in order.
+        pub records: Vec<EventRecord>,
+    }
 }
 
-/// Client to server: all events up to a number have been taken in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EventAck {
-    /// Number of the newest.
-    pub newest: u32,
+wire_struct! {
+    /// Client to server: all events up to a number have been taken in.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct EventAck {
+        /// Number of the newest.
+        pub newest: u32 => WRAPS,
+    }
 }
 
 /// Whether event `a` comes after event `b`.
@@ -218,11 +222,3 @@ impl EventInbox {
         self.overrun
     }
 }
-
-wire_ranged!(EventBatch {
-    after in WRAPS,
-    records
-});
-wire_ranged!(EventAck {
-    newest in WRAPS
-});

@@ -16,7 +16,7 @@
 
 use crate::{
     DecodeError, EncodeError, Header, Kind, Payload, Role, Untrusted,
-    codec::{Reader, Wire, Writer, wire_ranged},
+    codec::{Reader, Wire, Writer, wire_struct},
     derive::Root,
     range::{COUNT_32, SESSION},
     seal::{DatagramBuffer, KEY_MATERIAL_BYTES, OpenError, Opened, Opener, SealError, Sealer},
@@ -60,30 +60,34 @@ impl fmt::Debug for GroupSecret {
     }
 }
 
-/// One member, as the roster tells it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GroupMember {
-    /// Session number: `sender` in datagram headers.
-    pub sender: u16,
-    /// Name of the node.
-    pub node: Untrusted,
-    /// What it is.
-    pub role: Role,
-    /// Where its hot plane listens, as the server sees it; `None` before its first datagram, and for QUIC datagrams.
-    pub address: Option<SocketAddr>,
+wire_struct! {
+    /// One member, as the roster tells it.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct GroupMember {
+        /// Session number: `sender` in datagram headers.
+        pub sender: u16 => SESSION,
+        /// Name of the node.
+        pub node: Untrusted,
+        /// What it is.
+        pub role: Role,
+        /// Where its hot plane listens, as the server sees it; `None` before its first datagram, and for QUIC datagrams.
+        pub address: Option<SocketAddr>,
+    }
 }
 
-/// What the server tells the members: at join, and whenever it changes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Group {
-    /// Grows with every change of membership; the same while only addresses change.
-    pub generation: u32,
-    /// Secret of this generation.
-    pub secret: GroupSecret,
-    /// Who is in, by sender number. Devices are not: nothing is sent to them under a group key.
-    pub members: Vec<GroupMember>,
-    /// Where the server sends states for all, if it does.
-    pub multicast: Option<SocketAddr>,
+wire_struct! {
+    /// What the server tells the members: at join, and whenever it changes.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct Group {
+        /// Grows with every change of membership; the same while only addresses change.
+        pub generation: u32 => COUNT_32,
+        /// Secret of this generation.
+        pub secret: GroupSecret,
+        /// Who is in, by sender number. Devices are not: nothing is sent to them under a group key.
+        pub members: Vec<GroupMember>,
+        /// Where the server sends states for all, if it does.
+        pub multicast: Option<SocketAddr>,
+    }
 }
 
 impl Group {
@@ -375,16 +379,3 @@ impl Wire for SocketAddr {
         Ok(SocketAddr::new(ip, u16::read(from)?))
     }
 }
-
-wire_ranged!(GroupMember {
-    sender in SESSION,
-    node,
-    role,
-    address
-});
-wire_ranged!(Group {
-    generation in COUNT_32,
-    secret,
-    members,
-    multicast
-});

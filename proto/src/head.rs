@@ -2,23 +2,19 @@
 
 use crate::{
     PoseF64,
-    codec::wire_ranged,
+    codec::wire_struct,
     range::{COUNT, TIME},
 };
 
-/// One reading of the tracker on the viewer's head.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeadSample {
-    /// When it was read: session time as the tracker's PC knows it, ns; 0 while its clock is not locked.
-    pub sample_time_ns: u64,
-    /// Number of the reading, strictly increasing; the newest wins.
-    pub index: u64,
-    /// Head in the workbench frame: between the eyes, x to the right ear, y up, −z ahead.
-    pub pose: PoseF64,
+wire_struct! {
+    /// One reading of the tracker on the viewer's head.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct HeadSample {
+        /// When it was read: session time as the tracker's PC knows it, ns; 0 while its clock is not locked.
+        pub sample_time_ns: u64 => TIME,
+        /// Number of the reading, strictly increasing; the newest wins.
+        pub index: u64 => COUNT,
+        /// Head in the workbench frame: between the eyes, x to the right ear, y up, −z ahead.
+        pub pose: PoseF64,
+    }
 }
-
-wire_ranged!(HeadSample {
-    sample_time_ns in TIME,
-    index in COUNT,
-    pose
-});

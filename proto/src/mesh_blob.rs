@@ -12,7 +12,7 @@
 //! |        | normals   | n × 12 or 0        | unit, per vertex                             |
 //! |        | finish    | 8 or 0             | roughness, metallic: 0 to 1                  |
 
-use crate::{DecodeError, EncodeError, codec::wire_ranged};
+use crate::{DecodeError, EncodeError, codec::wire_struct};
 
 /// Most bytes of an encoded mesh: 4 million triangles.
 pub const MAX_MESH_BYTES: usize = 128 << 20;
@@ -24,14 +24,14 @@ const LAYOUT_NORMALS: u8 = 2;
 const LAYOUT_FINISH: u8 = 4;
 const FINISH_BYTES: usize = 8;
 
-/// BLAKE3 hash of an encoded mesh.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct MeshHash {
-    /// The 32 bytes.
-    pub bytes: [u8; 32],
+wire_struct! {
+    /// BLAKE3 hash of an encoded mesh.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+    pub struct MeshHash {
+        /// The 32 bytes.
+        pub bytes: [u8; 32],
+    }
 }
-
-wire_ranged!(MeshHash { bytes });
 
 impl MeshHash {
     /// Hash of an encoded mesh.

@@ -7,20 +7,20 @@
 //!
 //! A state machine: times and tokens are arguments.
 
-use crate::{codec::wire_ranged, range::NAME};
+use crate::{codec::wire_struct, range::NAME};
 use std::net::{IpAddr, SocketAddr};
 
 /// Shortest distance between two challenges of one session, ns.
 pub const CHALLENGE_PERIOD_NS: u64 = 50_000_000;
 
-/// Body of a challenge and of its answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PathToken {
-    /// Drawn at random for one address.
-    pub token: u64,
+wire_struct! {
+    /// Body of a challenge and of its answer.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct PathToken {
+        /// Drawn at random for one address.
+        pub token: u64 => NAME,
+    }
 }
-
-wire_ranged!(PathToken { token in NAME });
 
 /// An address that is not proven yet.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! Poses on the wire: position in m, unit quaternion w x y z; world_from_body of the body's own frame.
 
 use crate::{
-    codec::wire_ranged,
+    codec::wire_struct,
     range::{LENGTH, UNIT},
 };
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -9,32 +9,27 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 /// Largest deviation of a received quaternion's norm from 1 that is taken for rounding; beyond it the pose is refused.
 pub const QUATERNION_NORM_TOLERANCE: f64 = 1e-3;
 
-/// A pose in single precision: what is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseF32 {
-    /// Position, m.
-    pub position: [f32; 3],
-    /// Unit quaternion, w x y z.
-    pub rotation: [f32; 4],
+wire_struct! {
+    /// A pose in single precision: what is drawn.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct PoseF32 {
+        /// Position, m.
+        pub position: [f32; 3] => LENGTH,
+        /// Unit quaternion, w x y z.
+        pub rotation: [f32; 4] => UNIT,
+    }
 }
 
-/// A pose in double precision: what is computed with.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseF64 {
-    /// Position, m.
-    pub position: [f64; 3],
-    /// Unit quaternion, w x y z.
-    pub rotation: [f64; 4],
+wire_struct! {
+    /// A pose in double precision: what is computed with.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct PoseF64 {
+        /// Position, m.
+        pub position: [f64; 3] => LENGTH,
+        /// Unit quaternion, w x y z.
+        pub rotation: [f64; 4] => UNIT,
+    }
 }
-
-wire_ranged!(PoseF32 {
-    position in LENGTH,
-    rotation in UNIT
-});
-wire_ranged!(PoseF64 {
-    position in LENGTH,
-    rotation in UNIT
-});
 
 impl PoseF32 {
     /// At the origin, unrotated.

@@ -1,7 +1,7 @@
 //! What each number from outside may be: the only list, read where numbers are decoded.
 //!
 //! A message with a number out of its range is refused by name, in both directions: nobody sends what nobody takes. A field of a message that is a
-//! number and has no range does not compile ([`wire_ranged`](crate::codec)). What depends on what the receiver knows (a term near the known
+//! number and has no range does not compile ([`wire_struct`](crate::codec)). What depends on what the receiver knows (a term near the known
 //! one, an acknowledged event that was told) is checked by the state machine that knows it; `docs/numbers.md` lists both.
 
 use crate::{

@@ -2,50 +2,52 @@
 
 use crate::{
     MeshHash, PoseF64, Untrusted,
-    codec::{wire_ranged, wire_tag},
+    codec::{wire_struct, wire_tag},
     range::{
         ANGLE, COLOUR, COLOUR_MIX, EXPONENT, LENGTH, NAME, PIXELS, PUPILS, RESPONSE, SAMPLING,
         SCALE, SHARE, SIZE,
     },
 };
 
-/// What a client learns at join, before the first state.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SceneDescription {
-    /// Name of the scene.
-    pub name: Untrusted,
-    /// Revision; [`crate::HotState::scene_revision`] refers to it.
-    pub revision: u32,
-    /// The god-object.
-    pub god_object: BodyDescription,
-    /// The obstacles, then what is only seen; a state's body numbers are indices into this list.
-    pub obstacles: Vec<BodyDescription>,
-    /// Reference point of the god-object, m, in its body frame.
-    pub reference_point: [f64; 3],
-    /// Scene frame in the workbench frame.
-    pub scene_origin: PoseF64,
-    /// Size of the scene on the workbench over its size in the simulation, above 0.
-    pub display_scale: f64,
-    /// The screens.
-    pub screens: Vec<ScreenDescription>,
-    /// The render nodes.
-    pub nodes: Vec<NodeDescription>,
-    /// The viewer where no head tracker says otherwise, in the workbench frame.
-    pub viewer: PoseF64,
-    /// Distance between the pupils, m.
-    pub eye_separation: f64,
-    /// Near clipping distance, m.
-    pub near: f64,
-    /// Far clipping distance, m.
-    pub far: f64,
-    /// Factor on `eye_separation` with which pictures are drawn, 0 to 1: below 1 the world is flatter and easier on the eyes.
-    pub separation_scale: f64,
-    /// Most that anything may stand out towards the viewer, as an angle between the eyes, rad; 0 is no limit.
-    pub nearest_disparity: f64,
-    /// What is drawn besides the scene.
-    pub show: Show,
-    /// The light around the scene, by the hash of its [`crate::Panorama`]; `None` is the studio that every node knows.
-    pub environment: Option<MeshHash>,
+wire_struct! {
+    /// What a client learns at join, before the first state.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct SceneDescription {
+        /// Name of the scene.
+        pub name: Untrusted,
+        /// Revision; [`crate::HotState::scene_revision`] refers to it.
+        pub revision: u32 => NAME,
+        /// The god-object.
+        pub god_object: BodyDescription,
+        /// The obstacles, then what is only seen; a state's body numbers are indices into this list.
+        pub obstacles: Vec<BodyDescription>,
+        /// Reference point of the god-object, m, in its body frame.
+        pub reference_point: [f64; 3] => LENGTH,
+        /// Scene frame in the workbench frame.
+        pub scene_origin: PoseF64,
+        /// Size of the scene on the workbench over its size in the simulation, above 0.
+        pub display_scale: f64 => SCALE,
+        /// The screens.
+        pub screens: Vec<ScreenDescription>,
+        /// The render nodes.
+        pub nodes: Vec<NodeDescription>,
+        /// The viewer where no head tracker says otherwise, in the workbench frame.
+        pub viewer: PoseF64,
+        /// Distance between the pupils, m.
+        pub eye_separation: f64 => PUPILS,
+        /// Near clipping distance, m.
+        pub near: f64 => SIZE,
+        /// Far clipping distance, m.
+        pub far: f64 => SIZE,
+        /// Factor on `eye_separation` with which pictures are drawn, 0 to 1: below 1 the world is flatter and easier on the eyes.
+        pub separation_scale: f64 => SHARE,
+        /// Most that anything may stand out towards the viewer, as an angle between the eyes, rad; 0 is no limit.
+        pub nearest_disparity: f64 => ANGLE,
+        /// What is drawn besides the scene.
+        pub show: Show,
+        /// The light around the scene, by the hash of its [`crate::Panorama`]; `None` is the studio that every node knows.
+        pub environment: Option<MeshHash>,
+    }
 }
 
 impl SceneDescription {
@@ -74,53 +76,59 @@ impl SceneDescription {
     }
 }
 
-/// A body: mesh by hash, pose at start, colour.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BodyDescription {
-    /// Name, unique in the scene.
-    pub name: Untrusted,
-    /// Mesh, in the body's own frame.
-    pub mesh: MeshHash,
-    /// Body in the scene frame at start.
-    pub pose: PoseF64,
-    /// Linear RGB and opacity, 0 to 1.
-    pub colour: [f32; 4],
+wire_struct! {
+    /// A body: mesh by hash, pose at start, colour.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct BodyDescription {
+        /// Name, unique in the scene.
+        pub name: Untrusted,
+        /// Mesh, in the body's own frame.
+        pub mesh: MeshHash,
+        /// Body in the scene frame at start.
+        pub pose: PoseF64,
+        /// Linear RGB and opacity, 0 to 1.
+        pub colour: [f32; 4] => COLOUR,
+    }
 }
 
-/// A flat screen by three corners, m, workbench frame.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ScreenDescription {
-    /// Name, unique in the workbench.
-    pub name: Untrusted,
-    /// Lower left corner as the viewer sees it.
-    pub lower_left: [f64; 3],
-    /// Lower right corner.
-    pub lower_right: [f64; 3],
-    /// Upper left corner.
-    pub upper_left: [f64; 3],
-    /// How its picture becomes what its projector or monitor gets.
-    pub output: OutputDescription,
+wire_struct! {
+    /// A flat screen by three corners, m, workbench frame.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct ScreenDescription {
+        /// Name, unique in the workbench.
+        pub name: Untrusted,
+        /// Lower left corner as the viewer sees it.
+        pub lower_left: [f64; 3] => LENGTH,
+        /// Lower right corner.
+        pub lower_right: [f64; 3] => LENGTH,
+        /// Upper left corner.
+        pub upper_left: [f64; 3] => LENGTH,
+        /// How its picture becomes what its projector or monitor gets.
+        pub output: OutputDescription,
+    }
 }
 
-/// How the picture of a screen is corrected for what shows it. Files are named as the workbench file names them, and are read
-/// by the nodes that draw the screen; of a list, the one file is for both eyes, or the first for the left and the
-/// second for the right.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OutputDescription {
-    /// Meshes that warp the flat picture; none leaves it.
-    pub warp: Vec<Untrusted>,
-    /// Points of the surface that is lit, instead of the flat screen; none has the flat screen.
-    pub surface: Vec<Untrusted>,
-    /// Masks of the light that each pixel keeps; none keeps all.
-    pub blend: Vec<Untrusted>,
-    /// Exponent that makes a mask's values shares of light.
-    pub blend_gamma: f64,
-    /// Light sent for light wanted, both linear red, green and blue; row by row.
-    pub colour: [f64; 9],
-    /// Exponents of the responses of red, green and blue, light over signal; 0 is that of sRGB.
-    pub gamma: [f64; 3],
-    /// Pixels that are drawn for a pixel of the output, each way, before they are warped.
-    pub sampling: f64,
+wire_struct! {
+    /// How the picture of a screen is corrected for what shows it. Files are named as the workbench file names them, and are read
+    /// by the nodes that draw the screen; of a list, the one file is for both eyes, or the first for the left and the
+    /// second for the right.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct OutputDescription {
+        /// Meshes that warp the flat picture; none leaves it.
+        pub warp: Vec<Untrusted>,
+        /// Points of the surface that is lit, instead of the flat screen; none has the flat screen.
+        pub surface: Vec<Untrusted>,
+        /// Masks of the light that each pixel keeps; none keeps all.
+        pub blend: Vec<Untrusted>,
+        /// Exponent that makes a mask's values shares of light.
+        pub blend_gamma: f64 => EXPONENT,
+        /// Light sent for light wanted, both linear red, green and blue; row by row.
+        pub colour: [f64; 9] => COLOUR_MIX,
+        /// Exponents of the responses of red, green and blue, light over signal; 0 is that of sRGB.
+        pub gamma: [f64; 3] => RESPONSE,
+        /// Pixels that are drawn for a pixel of the output, each way, before they are warped.
+        pub sampling: f64 => SAMPLING,
+    }
 }
 
 impl Default for OutputDescription {
@@ -138,20 +146,22 @@ impl Default for OutputDescription {
     }
 }
 
-/// A render node.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NodeDescription {
-    /// Name that the node gives in its Hello.
-    pub name: Untrusted,
-    /// Names of the screens that it draws.
-    pub screens: Vec<Untrusted>,
-    /// How it shows two eyes.
-    pub stereo: Stereo,
-    /// Its window.
-    pub window: WindowDescription,
-    /// Which monitors its windows cover, in the order of the windows: an output's name such as DP-1, or its number from 0.
-    /// Windows past the end take the monitors that follow.
-    pub monitors: Vec<Untrusted>,
+wire_struct! {
+    /// A render node.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct NodeDescription {
+        /// Name that the node gives in its Hello.
+        pub name: Untrusted,
+        /// Names of the screens that it draws.
+        pub screens: Vec<Untrusted>,
+        /// How it shows two eyes.
+        pub stereo: Stereo,
+        /// Its window.
+        pub window: WindowDescription,
+        /// Which monitors its windows cover, in the order of the windows: an output's name such as DP-1, or its number from 0.
+        /// Windows past the end take the monitors that follow.
+        pub monitors: Vec<Untrusted>,
+    }
 }
 
 /// How two eyes reach a screen.
@@ -199,30 +209,34 @@ impl Stereo {
     }
 }
 
-/// A window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WindowDescription {
-    /// Pixels.
-    pub width: u32,
-    /// Pixels.
-    pub height: u32,
-    /// Without frame, over the whole monitor.
-    pub fullscreen: bool,
+wire_struct! {
+    /// A window.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct WindowDescription {
+        /// Pixels.
+        pub width: u32 => PIXELS,
+        /// Pixels.
+        pub height: u32 => PIXELS,
+        /// Without frame, over the whole monitor.
+        pub fullscreen: bool,
+    }
 }
 
-/// What is drawn besides the scene, and with what effort; nothing besides by default: the paper shows the user the god-object only.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Show {
-    /// The device pose as a translucent copy of the god-object.
-    pub ghost: bool,
-    /// Contact points as dots.
-    pub contacts: bool,
-    /// The force on the hand as an arrow.
-    pub force: bool,
-    /// Lines of text about the node: its link, its frames, the age of what it draws.
-    pub hud: bool,
-    /// Surfaces mirror what is around them; without, they only get its light.
-    pub reflections: bool,
+wire_struct! {
+    /// What is drawn besides the scene, and with what effort; nothing besides by default: the paper shows the user the god-object only.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct Show {
+        /// The device pose as a translucent copy of the god-object.
+        pub ghost: bool,
+        /// Contact points as dots.
+        pub contacts: bool,
+        /// The force on the hand as an arrow.
+        pub force: bool,
+        /// Lines of text about the node: its link, its frames, the age of what it draws.
+        pub hud: bool,
+        /// Surfaces mirror what is around them; without, they only get its light.
+        pub reflections: bool,
+    }
 }
 
 impl Default for Show {
@@ -237,64 +251,4 @@ impl Default for Show {
     }
 }
 
-wire_ranged!(SceneDescription {
-    name,
-    revision in NAME,
-    god_object,
-    obstacles,
-    reference_point in LENGTH,
-    scene_origin,
-    display_scale in SCALE,
-    screens,
-    nodes,
-    viewer,
-    eye_separation in PUPILS,
-    near in SIZE,
-    far in SIZE,
-    separation_scale in SHARE,
-    nearest_disparity in ANGLE,
-    show,
-    environment,
-});
-wire_ranged!(BodyDescription {
-    name,
-    mesh,
-    pose,
-    colour in COLOUR
-});
-wire_ranged!(ScreenDescription {
-    name,
-    lower_left in LENGTH,
-    lower_right in LENGTH,
-    upper_left in LENGTH,
-    output
-});
-wire_ranged!(OutputDescription {
-    warp,
-    surface,
-    blend,
-    blend_gamma in EXPONENT,
-    colour in COLOUR_MIX,
-    gamma in RESPONSE,
-    sampling in SAMPLING
-});
-wire_ranged!(NodeDescription {
-    name,
-    screens,
-    stereo,
-    window,
-    monitors
-});
-wire_ranged!(WindowDescription {
-    width in PIXELS,
-    height in PIXELS,
-    fullscreen
-});
-wire_ranged!(Show {
-    ghost,
-    contacts,
-    force,
-    hud,
-    reflections
-});
 wire_tag!(Stereo, "stereo mode" { Mono = 0, SideBySide = 1, TopBottom = 2, Anaglyph = 3, TwoWindows = 4 });

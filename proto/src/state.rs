@@ -14,7 +14,7 @@
 
 use crate::{
     DecodeError, EncodeError, PoseF32,
-    codec::{Reader, Wire, Writer, encode_into, read_elements, wire_ranged},
+    codec::{Reader, Wire, Writer, encode_into, read_elements, wire_struct},
     header::MAX_PAYLOAD_BYTES,
     octahedral::{normal_from_octahedral, octahedral_from_normal},
     range::{
@@ -71,51 +71,57 @@ pub enum RunState {
     Fault,
 }
 
-/// The viewer's head.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeadState {
-    /// Head in the workbench frame: between the eyes, x to the right ear, y up, −z ahead.
-    pub pose: PoseF32,
-    /// How much older than `sample_time_ns` the pose is, µs.
-    pub age_us: i32,
-    /// Distance between the pupils, m.
-    pub eye_separation: f32,
-    /// Bit 0: tracked (otherwise the workbench file's default viewer).
-    pub flags: u32,
+wire_struct! {
+    /// The viewer's head.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct HeadState {
+        /// Head in the workbench frame: between the eyes, x to the right ear, y up, −z ahead.
+        pub pose: PoseF32,
+        /// How much older than `sample_time_ns` the pose is, µs.
+        pub age_us: i32 => AGE_US,
+        /// Distance between the pupils, m.
+        pub eye_separation: f32 => PUPILS,
+        /// Bit 0: tracked (otherwise the workbench file's default viewer).
+        pub flags: u32 => BITS,
+    }
 }
 
-/// One god-object and the device that pulls it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ToolState {
-    /// God-object, in the scene frame: what is drawn.
-    pub god_object: PoseF32,
-    /// Device as used by the loops, in the scene frame: the ghost.
-    pub device: PoseF32,
-    /// Velocity of the god-object at the reference point, m/s, scene axes.
-    pub linear_velocity: [f32; 3],
-    /// Angular velocity of the god-object, rad/s, scene axes.
-    pub angular_velocity: [f32; 3],
-    /// Force on the user's hand, N, scene axes.
-    pub force: [f32; 3],
-    /// Torque on the user's hand at the reference point, N m, scene axes.
-    pub torque: [f32; 3],
-    /// Device buttons, bit 0 the first.
-    pub buttons: u16,
-    /// Bit 0: the force was limited. Bit 1: the device is silent.
-    pub flags: u16,
-    /// Number of the tool, from 0.
-    pub id: u32,
+wire_struct! {
+    /// One god-object and the device that pulls it.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ToolState {
+        /// God-object, in the scene frame: what is drawn.
+        pub god_object: PoseF32,
+        /// Device as used by the loops, in the scene frame: the ghost.
+        pub device: PoseF32,
+        /// Velocity of the god-object at the reference point, m/s, scene axes.
+        pub linear_velocity: [f32; 3] => VELOCITY,
+        /// Angular velocity of the god-object, rad/s, scene axes.
+        pub angular_velocity: [f32; 3] => VELOCITY,
+        /// Force on the user's hand, N, scene axes.
+        pub force: [f32; 3] => FORCE,
+        /// Torque on the user's hand at the reference point, N m, scene axes.
+        pub torque: [f32; 3] => FORCE,
+        /// Device buttons, bit 0 the first.
+        pub buttons: u16 => BITS,
+        /// Bit 0: the force was limited. Bit 1: the device is silent.
+        pub flags: u16 => BITS,
+        /// Number of the tool, from 0.
+        pub id: u32 => NAME,
+    }
 }
 
-/// A body that moved.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BodyState {
-    /// Index into the scene description's obstacles.
-    pub id: u16,
-    /// Reserved, 0.
-    pub flags: u16,
-    /// Body in the scene frame.
-    pub pose: PoseF32,
+wire_struct! {
+    /// A body that moved.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct BodyState {
+        /// Index into the scene description's obstacles.
+        pub id: u16 => NAME,
+        /// Reserved, 0.
+        pub flags: u16 => BITS,
+        /// Body in the scene frame.
+        pub pose: PoseF32,
+    }
 }
 
 /// One contact of the god-object.
@@ -133,15 +139,17 @@ pub struct ContactState {
     pub gap: f32,
 }
 
-/// One discrete event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EventRecord {
-    /// Number of the event, strictly increasing: a client takes each once.
-    pub id: u32,
-    /// Low half of the tick at which it happened.
-    pub tick: u32,
-    /// What happened: see [`event_code`].
-    pub code: u32,
+wire_struct! {
+    /// One discrete event.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct EventRecord {
+        /// Number of the event, strictly increasing: a client takes each once.
+        pub id: u32 => WRAPS,
+        /// Low half of the tick at which it happened.
+        pub tick: u32 => WRAPS,
+        /// What happened: see [`event_code`].
+        pub code: u32 => NAME,
+    }
 }
 
 /// Values of [`EventRecord::code`].
@@ -274,34 +282,6 @@ impl RunState {
         }
     }
 }
-
-wire_ranged!(HeadState {
-    pose,
-    age_us in AGE_US,
-    eye_separation in PUPILS,
-    flags in BITS
-});
-wire_ranged!(ToolState {
-    god_object,
-    device,
-    linear_velocity in VELOCITY,
-    angular_velocity in VELOCITY,
-    force in FORCE,
-    torque in FORCE,
-    buttons in BITS,
-    flags in BITS,
-    id in NAME
-});
-wire_ranged!(BodyState {
-    id in NAME,
-    flags in BITS,
-    pose
-});
-wire_ranged!(EventRecord {
-    id in WRAPS,
-    tick in WRAPS,
-    code in NAME
-});
 
 const SAMPLE_TIME: Number = Number::new("HotState.sample_time_ns", TIME);
 const TICK: Number = Number::new("HotState.tick", COUNT);

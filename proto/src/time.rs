@@ -9,31 +9,26 @@
 //!
 //! All in ns: of the session at the server, since any fixed moment at the client.
 
-use crate::{codec::wire_ranged, range::TIME};
+use crate::{codec::wire_struct, range::TIME};
 
-/// Client to server.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TimeRequest {
-    /// t1, ns.
-    pub client_sent: u64,
+wire_struct! {
+    /// Client to server.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct TimeRequest {
+        /// t1, ns.
+        pub client_sent: u64 => TIME,
+    }
 }
 
-/// Server to client.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TimeResponse {
-    /// t1, ns, as received.
-    pub client_sent: u64,
-    /// t2, ns.
-    pub server_received: u64,
-    /// t3, ns.
-    pub server_sent: u64,
+wire_struct! {
+    /// Server to client.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct TimeResponse {
+        /// t1, ns, as received.
+        pub client_sent: u64 => TIME,
+        /// t2, ns.
+        pub server_received: u64 => TIME,
+        /// t3, ns.
+        pub server_sent: u64 => TIME,
+    }
 }
-
-wire_ranged!(TimeRequest {
-    client_sent in TIME
-});
-wire_ranged!(TimeResponse {
-    client_sent in TIME,
-    server_received in TIME,
-    server_sent in TIME
-});

@@ -57,9 +57,7 @@ pub fn released(master: &Master) -> u64 {
 
 /// Polls at the moment that the master asks for, and not a nanosecond before.
 pub fn release_when_due(master: &mut Master) -> u64 {
-    let Some(wake) = master.wake_ns() else {
-        panic!("there are nodes");
-    };
+    let wake = master.wake_ns().expect("there are nodes");
     assert!(master.poll(wake - 1, Newest::default()).is_none());
     assert!(master.poll(wake, Newest::default()).is_some());
     wake

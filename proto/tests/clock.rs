@@ -214,9 +214,7 @@ fn under_attack(
         let mut usual = || 50_000 + random.below(100_000);
         let end = server.exchange(&mut filter, sent, up + usual(), down + usual());
         if sent >= begin {
-            let Some(time) = filter.session_time(end) else {
-                panic!("not locked");
-            };
+            let time = filter.session_time(end).expect("not locked");
             let error = error_ns(&filter, &server, end);
             assert!(error.unsigned_abs() <= time.uncertainty_ns, "{error}");
             seen(sent - begin, error, time.uncertainty_ns);

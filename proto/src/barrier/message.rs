@@ -4,7 +4,7 @@
 
 use crate::{
     DecodeError, EncodeError, HotState,
-    codec::{Reader, Wire, Writer, read_elements, wire_ranged},
+    codec::{Reader, Wire, Writer, read_elements, wire_struct},
     range::{BITS, COUNT, COUNT_32, NAME, NODE_PERIOD, Number, PERIOD, SENDER, TIME},
 };
 use arrayvec::ArrayVec;
@@ -15,51 +15,38 @@ pub const MAX_MEMBERS: usize = 32;
 /// Bytes of a [`ReleaseHead`] before the number of members.
 const FIXED_BYTES: usize = 42;
 
-/// ARRIVE payload, node to master: a frame is drawn.
-///
-/// Session times are 0 while the node's clock is not locked, or known too badly to plan a swap by.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Arrive {
-    /// [`ReleaseHead::term`] that the node follows; 0 for none.
-    pub term: u64,
-    /// The frame; 0 says that the node has none yet and wants to take part.
-    pub frame: u64,
-    /// When it was drawn: session time, ns.
-    pub ready_ns: u64,
-    /// [`crate::state::payload_hash`] of the state that was drawn.
-    pub state_hash: u64,
-    /// [`HotState::sample_time_ns`] of that state.
-    pub state_time_ns: u64,
-    /// Frames that were released and not shown by this node, since it started.
-    pub missed: u32,
-    /// The frame whose swap is told; 0 for none.
-    pub swapped_frame: u64,
-    /// When the swap of that frame was called: session time, ns.
-    pub swapped_ns: u64,
-    /// The frame whose light is told; 0 for none, as where the window system tells no such times.
-    pub lit_frame: u64,
-    /// When its last picture lit up: session time, ns.
-    pub lit_ns: u64,
-    /// How long drawing took, µs.
-    pub draw_us: u32,
-    /// Shortest time between two frames that this node is made for, µs; 0 for no limit of its own.
-    pub period_us: u32,
+wire_struct! {
+    /// ARRIVE payload, node to master: a frame is drawn.
+    ///
+    /// Session times are 0 while the node's clock is not locked, or known too badly to plan a swap by.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub struct Arrive {
+        /// [`ReleaseHead::term`] that the node follows; 0 for none.
+        pub term: u64 => COUNT,
+        /// The frame; 0 says that the node has none yet and wants to take part.
+        pub frame: u64 => COUNT,
+        /// When it was drawn: session time, ns.
+        pub ready_ns: u64 => TIME,
+        /// [`crate::state::payload_hash`] of the state that was drawn.
+        pub state_hash: u64 => NAME,
+        /// [`HotState::sample_time_ns`] of that state.
+        pub state_time_ns: u64 => TIME,
+        /// Frames that were released and not shown by this node, since it started.
+        pub missed: u32 => COUNT_32,
+        /// The frame whose swap is told; 0 for none.
+        pub swapped_frame: u64 => COUNT,
+        /// When the swap of that frame was called: session time, ns.
+        pub swapped_ns: u64 => TIME,
+        /// The frame whose light is told; 0 for none, as where the window system tells no such times.
+        pub lit_frame: u64 => COUNT,
+        /// When its last picture lit up: session time, ns.
+        pub lit_ns: u64 => TIME,
+        /// How long drawing took, µs.
+        pub draw_us: u32 => COUNT_32,
+        /// Shortest time between two frames that this node is made for, µs; 0 for no limit of its own.
+        pub period_us: u32 => NODE_PERIOD,
+    }
 }
-
-wire_ranged!(Arrive {
-    term in COUNT,
-    frame in COUNT,
-    ready_ns in TIME,
-    state_hash in NAME,
-    state_time_ns in TIME,
-    missed in COUNT_32,
-    swapped_frame in COUNT,
-    swapped_ns in TIME,
-    lit_frame in COUNT,
-    lit_ns in TIME,
-    draw_us in COUNT_32,
-    period_us in NODE_PERIOD
-});
 
 /// What a RELEASE says beside the state.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -85,13 +72,15 @@ pub struct ReleaseHead {
     pub members: ArrayVec<u16, MAX_MEMBERS>,
 }
 
-/// RELEASE payload, master to all nodes: the frame is to be shown, and the next one to be drawn from this state.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Release {
-    /// Which frame, when, who.
-    pub head: ReleaseHead,
-    /// The state of frame `head.frame + 1`, the bytes as they were broadcast.
-    pub state: HotState,
+wire_struct! {
+    /// RELEASE payload, master to all nodes: the frame is to be shown, and the next one to be drawn from this state.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Release {
+        /// Which frame, when, who.
+        pub head: ReleaseHead,
+        /// The state of frame `head.frame + 1`, the bytes as they were broadcast.
+        pub state: HotState,
+    }
 }
 
 impl ReleaseHead {
@@ -186,8 +175,6 @@ impl Wire for ReleaseHead {
         })
     }
 }
-
-wire_ranged!(Release { head, state });
 
 /// The bytes of the state in the payload of a RELEASE, for its fingerprint; empty if the payload is no RELEASE.
 pub fn state_bytes(payload: &[u8]) -> &[u8] {
