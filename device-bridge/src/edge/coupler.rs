@@ -158,9 +158,10 @@ impl EdgeCoupler {
 pub(crate) mod tests {
     use super::*;
     use crate::device::Pose;
+    use crate::edge::settings::to_wire;
+    use god_object::Settings;
     use proto::PoseF64;
     use proto::constraints::{ConstraintRow, SetHead};
-    use proto::coupling::EdgeSettings;
 
     pub(crate) fn offer() -> EdgeCoupling {
         EdgeCoupling {
@@ -168,29 +169,11 @@ pub(crate) mod tests {
             inertia: [1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3],
             reference_point: [0.0; 3],
             radius: 0.02,
-            settings: EdgeSettings {
-                k_s: 0.5,
-                k_h: 2000.0,
-                damping_time: 0.0,
-                radius_of_gyration: None,
+            settings: to_wire(&Settings {
                 adaptation: None,
-                look_ahead: true,
-                passive: false,
-                force_limit: 20.0,
-                torque_limit: 0.5,
-                rest_distance: 4e-6,
-                minimum_gap: 4e-7,
-                gap_tolerance: 4e-8,
-                activation_distance: 1.6e-4,
-                look_ahead_limit: 0.16,
-                look_ahead_pairs: 1000,
-                motion_tolerance: 2e-8,
-                max_constraints: 1024,
-                max_substeps: 10,
-                implicit_rounds: 0,
-                max_advancement_steps: 200,
-                work_budget: None,
-            },
+                ..Settings::for_size(0.04)
+            })
+            .expect("for the edge"),
             set_rate_hz: 1000.0,
             obstacles: Vec::new(),
         }

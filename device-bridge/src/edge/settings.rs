@@ -1,6 +1,4 @@
 //! The method's settings to the wire and back, whole.
-//!
-//! Both ways name every field: one that is added to [`Settings`] or to [`EdgeSettings`] does not compile until it is sent.
 
 use god_object::{Adaptation, RotationMetric, Settings, SolverKind};
 use taut_link::proto::constraints::MAX_SET_ROWS;
@@ -17,72 +15,41 @@ pub(super) enum NotAtEdge {
     Solver,
 }
 
+/// `$source`, a `$Source`, as a `$Target`: the fields named here are the same on both sides, those in braces differ.
+///
+/// The pattern and the value are whole: a field that is added to either side does not compile until it is sent.
+macro_rules! converted {
+    ($source:expr, $Source:ident { $($differs:ident $(: $ignored:tt)?),* } => $Target:ident { $($field:ident: $value:expr),* $(,)? }) => {
+        converted!(@ $source, $Source { $($differs $(: $ignored)?),* } => $Target { $($field: $value),* };
+            k_s k_h damping_time look_ahead passive force_limit torque_limit rest_distance minimum_gap gap_tolerance
+            activation_distance look_ahead_limit look_ahead_pairs motion_tolerance max_substeps implicit_rounds
+            max_advancement_steps work_budget)
+    };
+    (@ $source:expr, $Source:ident { $($differs:ident $(: $ignored:tt)?),* } => $Target:ident { $($field:ident: $value:expr),* }; $($same:ident)*) => {{
+        let $Source { $($differs $(: $ignored)?,)* $($same),* } = $source;
+        $Target { $($field: $value,)* $($same),* }
+    }};
+}
+
 /// The settings in the form in which they travel.
 pub(super) fn to_wire(settings: &Settings) -> Result<EdgeSettings, NotAtEdge> {
-    let Settings {
-        k_s,
-        k_h,
-        damping_time,
-        rotation_metric,
-        adaptation,
-        look_ahead,
-        passive,
-        force_limit,
-        torque_limit,
-        rest_distance,
-        minimum_gap,
-        gap_tolerance,
-        activation_distance,
-        look_ahead_limit,
-        look_ahead_pairs,
-        motion_tolerance,
-        max_constraints,
-        max_substeps,
-        implicit_rounds,
-        max_advancement_steps,
-        work_budget,
-        solver,
-    } = *settings;
-    if max_constraints > MAX_SET_ROWS {
+    if settings.max_constraints > MAX_SET_ROWS {
         return Err(NotAtEdge::TooManyRows);
     }
-    if solver != SolverKind::ActiveSet {
+    if settings.solver != SolverKind::ActiveSet {
         return Err(NotAtEdge::Solver); // the others allocate
     }
-    Ok(EdgeSettings {
-        k_s,
-        k_h,
-        damping_time,
-        radius_of_gyration: match rotation_metric {
-            RotationMetric::Inertia => None,
-            RotationMetric::RadiusOfGyration(radius) => Some(radius),
-        },
-        adaptation: adaptation.map(
-            |Adaptation {
-                 duration,
-                 threshold,
-             }| EdgeAdaptation {
-                duration,
-                threshold,
+    Ok(converted!(
+        *settings,
+        Settings { rotation_metric, adaptation, max_constraints, solver: _ } => EdgeSettings {
+            radius_of_gyration: match rotation_metric {
+                RotationMetric::Inertia => None,
+                RotationMetric::RadiusOfGyration(radius) => Some(radius),
             },
-        ),
-        look_ahead,
-        passive,
-        force_limit,
-        torque_limit,
-        rest_distance,
-        minimum_gap,
-        gap_tolerance,
-        activation_distance,
-        look_ahead_limit,
-        look_ahead_pairs,
-        motion_tolerance,
-        max_constraints: max_constraints as u32, // at most MAX_SET_ROWS
-        max_substeps,
-        implicit_rounds,
-        max_advancement_steps,
-        work_budget,
-    })
+            adaptation: adaptation.map(|Adaptation { duration, threshold }| EdgeAdaptation { duration, threshold }),
+            max_constraints: max_constraints as u32, // at most MAX_SET_ROWS
+        }
+    ))
 }
 
 /// The settings that travelled.
@@ -90,67 +57,20 @@ pub(super) fn to_wire(settings: &Settings) -> Result<EdgeSettings, NotAtEdge> {
 /// # Errors
 /// [`OfferError`]: one is out of its range.
 pub(super) fn from_wire(wire: &EdgeSettings) -> Result<Settings, OfferError> {
-    let EdgeSettings {
-        k_s,
-        k_h,
-        damping_time,
-        radius_of_gyration,
-        adaptation,
-        look_ahead,
-        passive,
-        force_limit,
-        torque_limit,
-        rest_distance,
-        minimum_gap,
-        gap_tolerance,
-        activation_distance,
-        look_ahead_limit,
-        look_ahead_pairs,
-        motion_tolerance,
-        max_constraints,
-        max_substeps,
-        implicit_rounds,
-        max_advancement_steps,
-        work_budget,
-    } = *wire;
-    if max_constraints as usize > MAX_SET_ROWS {
+    if wire.max_constraints as usize > MAX_SET_ROWS {
         return Err(OfferError::Invalid {
             what: "a number of rows",
         });
     }
-    let settings = Settings {
-        k_s,
-        k_h,
-        damping_time,
-        rotation_metric: radius_of_gyration
-            .map_or(RotationMetric::Inertia, RotationMetric::RadiusOfGyration),
-        adaptation: adaptation.map(
-            |EdgeAdaptation {
-                 duration,
-                 threshold,
-             }| Adaptation {
-                duration,
-                threshold,
-            },
-        ),
-        look_ahead,
-        passive,
-        force_limit,
-        torque_limit,
-        rest_distance,
-        minimum_gap,
-        gap_tolerance,
-        activation_distance,
-        look_ahead_limit,
-        look_ahead_pairs,
-        motion_tolerance,
-        max_constraints: max_constraints as usize,
-        max_substeps,
-        implicit_rounds,
-        max_advancement_steps,
-        work_budget,
-        solver: SolverKind::ActiveSet,
-    };
+    let settings = converted!(
+        *wire,
+        EdgeSettings { radius_of_gyration, adaptation, max_constraints } => Settings {
+            rotation_metric: radius_of_gyration.map_or(RotationMetric::Inertia, RotationMetric::RadiusOfGyration),
+            adaptation: adaptation.map(|EdgeAdaptation { duration, threshold }| Adaptation { duration, threshold }),
+            max_constraints: max_constraints as usize,
+            solver: SolverKind::ActiveSet,
+        }
+    );
     settings.validate()?;
     Ok(settings)
 }

@@ -38,8 +38,8 @@ pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply
 pub use problem::{FileError, Problem};
 pub use runner::{Onlooker, Runner, numbers_of_pose, pose_of_numbers};
 pub use scene::{
-    AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
-    EditedKey, GOD_OBJECT_NAME, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MassSpec,
+    BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec, EditedKey,
+    GOD_OBJECT_NAME, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MassSpec,
     MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, SceneSource,
     ScenerySpec, Shape, ShippedScene, View, shipped_scene_text,
 };

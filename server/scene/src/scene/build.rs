@@ -12,7 +12,7 @@ use taut_proto::Panorama;
 
 use super::auto_fidelity::AutoFidelity;
 use super::load::{Scene, unusable};
-use super::spec::{AdaptationSpec, MassSpec, ReferencePoint, Shape, View};
+use super::spec::{MassSpec, ObstacleSpec, ReferencePoint, Shape, View};
 use crate::appearance::Appearance;
 use crate::check::MeshFigures;
 use crate::document::At;
@@ -151,17 +151,7 @@ impl Scene {
             None
         });
         let motions = self.motions(&mut problems);
-        let textures: Vec<Option<Texture>> = spec
-            .obstacles
-            .iter()
-            .zip(&obstacle_meshes)
-            .map(|(o, mesh)| {
-                let (map, mesh) = (o.height_map.as_ref()?, mesh.as_ref()?);
-                self.height_map(map, &o.shape, mesh)
-                    .map_err(|error| problems.extend(error.into_problems()))
-                    .ok()
-            })
-            .collect();
+        let textures = self.textures(&obstacle_meshes, &mut problems);
         FileError::unless_empty(problems)?;
         let auto = match &body_mesh {
             Some(mesh) if spec.fidelity.is_some() => {
@@ -171,20 +161,7 @@ impl Scene {
             }
             _ => None,
         };
-        let named = std::iter::once((&spec.god_object.shape, GOD_OBJECT_NAME, &mut body_mesh))
-            .chain(
-                spec.obstacles
-                    .iter()
-                    .zip(&mut obstacle_meshes)
-                    .map(|(o, mesh)| (&o.shape, o.name.as_str(), mesh)),
-            );
-        let simplified = named
-            .enumerate()
-            .filter_map(|(index, (shape, name, mesh))| {
-                let chosen = auto.as_ref().and_then(|auto| auto.mesh_errors[index]);
-                simplify_as_asked(shape, chosen, name, mesh)
-            })
-            .collect();
+        let simplified = self.simplify_meshes(&mut body_mesh, &mut obstacle_meshes, auto.as_ref());
 
         let Some(mesh) = body_mesh else {
             return Err(self
@@ -202,40 +179,10 @@ impl Scene {
             let text = "the mass or inertia of the god-object is out of range; check mass, density and the mesh's size (metres)";
             return Err(spec.god_object.at.problem(text).into());
         }
-        let mut obstacles: Vec<Obstacle> = spec
-            .obstacles
-            .iter()
-            .zip(obstacle_meshes)
-            .zip(textures)
-            .enumerate()
-            .filter_map(|(index, ((o, mesh), texture))| {
-                let mut surface = o.surface.clone();
-                if let Some(auto) = &auto {
-                    auto.shade(index, &mut surface);
-                }
-                surface.texture = surface.texture.or(texture);
-                Some(Obstacle {
-                    name: o.name.clone(),
-                    mesh: mesh?,
-                    primitive: o.shape.primitive(),
-                    pose: o.pose,
-                    surface,
-                })
-            })
-            .collect();
-        for motion in &motions {
-            obstacles[motion.obstacle].pose = motion.pose_at(0.0);
-        }
-        let mut lost_looks = scenery_lost;
-        let held = &spec.god_object;
-        let look = held.appearance.or(body_look.appearance);
-        lost_looks.extend(lost_look(&held.shape, &held.appearance, &body_look));
-        let mut bodies = vec![drawn(GOD_OBJECT_NAME, &body.mesh, held.pose, look)];
-        for ((obstacle, spec), look) in obstacles.iter().zip(&spec.obstacles).zip(&looks) {
-            lost_looks.extend(lost_look(&spec.shape, &spec.appearance, look));
-            let look = spec.appearance.or(look.appearance);
-            bodies.push(drawn(&obstacle.name, &obstacle.mesh, obstacle.pose, look));
-        }
+        let obstacles = self.built_obstacles(obstacle_meshes, textures, auto.as_ref(), &motions);
+        let (bodies, mut lost_looks) =
+            self.drawn_bodies(&body.mesh, &obstacles, &body_look, &looks);
+        lost_looks.extend(scenery_lost);
         let hand = spec.hand.as_ref().zip(hand_path);
         let world = World { body, obstacles };
         GodObject::check_start(&world, &settings, &spec.god_object.pose)
@@ -260,6 +207,92 @@ impl Scene {
             size,
             fidelity: auto.map(|auto| auto.plan),
         })
+    }
+
+    /// The height maps of the obstacles that have one.
+    fn textures(
+        &self,
+        meshes: &[Option<Mesh>],
+        problems: &mut Vec<Problem>,
+    ) -> Vec<Option<Texture>> {
+        let of_one = |(o, mesh): (&ObstacleSpec, &Option<Mesh>)| {
+            let (map, mesh) = (o.height_map.as_ref()?, mesh.as_ref()?);
+            self.height_map(map, &o.shape, mesh)
+                .map_err(|error| problems.extend(error.into_problems()))
+                .ok()
+        };
+        self.spec.obstacles.iter().zip(meshes).map(of_one).collect()
+    }
+
+    /// Simplifies the meshes for which the scene asks for it, or the chosen fidelity does.
+    fn simplify_meshes(
+        &self,
+        body: &mut Option<Mesh>,
+        obstacles: &mut [Option<Mesh>],
+        auto: Option<&AutoFidelity>,
+    ) -> Vec<Simplified> {
+        let spec = &self.spec;
+        let obstacles = spec.obstacles.iter().zip(obstacles);
+        std::iter::once((&spec.god_object.shape, GOD_OBJECT_NAME, body))
+            .chain(obstacles.map(|(o, mesh)| (&o.shape, o.name.as_str(), mesh)))
+            .enumerate()
+            .filter_map(|(index, (shape, name, mesh))| {
+                let chosen = auto.and_then(|auto| auto.mesh_errors[index]);
+                simplify_as_asked(shape, chosen, name, mesh)
+            })
+            .collect()
+    }
+
+    /// The obstacles of the world, those that move where their motion begins.
+    fn built_obstacles(
+        &self,
+        meshes: Vec<Option<Mesh>>,
+        textures: Vec<Option<Texture>>,
+        auto: Option<&AutoFidelity>,
+        motions: &[BuiltMotion],
+    ) -> Vec<Obstacle> {
+        let made = self.spec.obstacles.iter().zip(meshes).zip(textures);
+        let mut obstacles: Vec<Obstacle> = made
+            .enumerate()
+            .filter_map(|(index, ((o, mesh), texture))| {
+                let mut surface = o.surface.clone();
+                if let Some(auto) = auto {
+                    auto.shade(index, &mut surface);
+                }
+                surface.texture = surface.texture.or(texture);
+                Some(Obstacle {
+                    name: o.name.clone(),
+                    mesh: mesh?,
+                    primitive: o.shape.primitive(),
+                    pose: o.pose,
+                    surface,
+                })
+            })
+            .collect();
+        for motion in motions {
+            obstacles[motion.obstacle].pose = motion.pose_at(0.0);
+        }
+        obstacles
+    }
+
+    /// God-object and obstacles as they are drawn, and what is lost of their looks.
+    fn drawn_bodies(
+        &self,
+        body: &Mesh,
+        obstacles: &[Obstacle],
+        body_look: &FileLook,
+        looks: &[FileLook],
+    ) -> (Vec<BuiltBody>, BTreeSet<String>) {
+        let held = &self.spec.god_object;
+        let look = held.appearance.or(body_look.appearance);
+        let mut bodies = vec![drawn(GOD_OBJECT_NAME, body, held.pose, look)];
+        let mut lost = BTreeSet::from_iter(lost_look(&held.shape, &held.appearance, body_look));
+        for ((obstacle, spec), look) in obstacles.iter().zip(&self.spec.obstacles).zip(looks) {
+            lost.extend(lost_look(&spec.shape, &spec.appearance, look));
+            let look = spec.appearance.or(look.appearance);
+            bodies.push(drawn(&obstacle.name, &obstacle.mesh, obstacle.pose, look));
+        }
+        (bodies, lost)
     }
 
     /// What is only seen, and what is lost of its look.
@@ -413,56 +446,26 @@ impl Scene {
 
     /// Defaults for the body's size, then what was chosen for the scene, then `[coupling]`, `[limits]` and `[method]`.
     fn settings(&self, size: f64, auto: Option<&AutoFidelity>) -> Result<Settings, FileError> {
-        let (coupling, limits, method) =
-            (&self.spec.coupling, &self.spec.limits, &self.spec.method);
-        let mut defaults = Settings::for_size(size);
-        if let Some(clearance) = method.clearance {
-            defaults = defaults.with_clearance(clearance);
+        let mut settings = Settings::for_size(size);
+        if let Some(clearance) = self.spec.method.clearance {
+            settings = settings.with_clearance(clearance);
         }
         let is_mesh = |shape: &Shape| shape.primitive().is_none();
         let obstacles = &self.spec.obstacles;
         let meshes_meet = is_mesh(&self.spec.god_object.shape)
             && obstacles.iter().any(|obstacle| is_mesh(&obstacle.shape));
         if !meshes_meet {
-            defaults = defaults.for_exact_shapes();
+            settings = settings.for_exact_shapes();
         }
         if let Some(auto) = auto {
-            defaults.gap_tolerance = auto.gap_tolerance;
-            defaults.implicit_rounds = auto.rounds;
+            settings.gap_tolerance = auto.gap_tolerance;
+            settings.implicit_rounds = auto.rounds;
             // A budget of time is kept, not only hoped for.
-            defaults.work_budget = auto.plan.time_us.map(|time| time.ceil() as u64);
+            settings.work_budget = auto.plan.time_us.map(|time| time.ceil() as u64);
         }
-        let settings = Settings {
-            k_s: coupling.k_s.unwrap_or(defaults.k_s),
-            k_h: coupling.k_h.unwrap_or(defaults.k_h),
-            damping_time: coupling.damping_time.unwrap_or(defaults.damping_time),
-            rotation_metric: coupling.rotation_metric.unwrap_or(defaults.rotation_metric),
-            adaptation: match coupling.adaptation {
-                None => defaults.adaptation,
-                Some(AdaptationSpec::Off) => None,
-                Some(AdaptationSpec::On(adaptation)) => Some(adaptation),
-            },
-            look_ahead: coupling.look_ahead.unwrap_or(defaults.look_ahead),
-            passive: coupling.passive.unwrap_or(defaults.passive),
-            force_limit: limits.force.unwrap_or(defaults.force_limit),
-            torque_limit: limits.torque.unwrap_or(defaults.torque_limit),
-            rest_distance: method.rest_distance.unwrap_or(defaults.rest_distance),
-            minimum_gap: method.minimum_gap.unwrap_or(defaults.minimum_gap),
-            gap_tolerance: method.gap_tolerance.unwrap_or(defaults.gap_tolerance),
-            activation_distance: method
-                .activation_distance
-                .unwrap_or(defaults.activation_distance),
-            motion_tolerance: method.motion_tolerance.unwrap_or(defaults.motion_tolerance),
-            max_constraints: method.max_constraints.unwrap_or(defaults.max_constraints),
-            max_substeps: method.max_substeps.unwrap_or(defaults.max_substeps),
-            implicit_rounds: method.implicit_rounds.unwrap_or(defaults.implicit_rounds),
-            max_advancement_steps: method
-                .max_advancement_steps
-                .unwrap_or(defaults.max_advancement_steps),
-            work_budget: method.work_budget.or(defaults.work_budget),
-            solver: method.solver.unwrap_or(defaults.solver),
-            ..defaults
-        };
+        self.spec.coupling.apply(&mut settings);
+        self.spec.limits.apply(&mut settings);
+        self.spec.method.apply(&mut settings);
         settings.validate().map_err(|error| {
             let text = format!("the settings for a body of {size} m do not fit together: {error}; check [coupling], [limits] and [method]");
             self.document_start().problem(text)

@@ -8,10 +8,10 @@ use taut_proto::Panorama;
 
 use super::build::GOD_OBJECT_NAME;
 use super::parse::{SceneSpec, parse};
+use super::settings_tables::{CouplingSpec, LimitSpec, MethodSpec};
 use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};
 use super::spec::{
-    BodySpec, CouplingSpec, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MethodSpec,
-    ObstacleSpec, ScenerySpec, Shape, View,
+    BodySpec, HandPathSpec, HeightMapMapping, HeightMapSpec, ObstacleSpec, ScenerySpec, Shape, View,
 };
 use crate::check::MeshFigures;
 use crate::document::{At, Document, Node, Value};

@@ -7,6 +7,7 @@ mod load;
 mod parse;
 mod parse_look;
 mod parse_shape;
+mod settings_tables;
 mod shipped;
 mod spec;
 
@@ -16,9 +17,9 @@ pub(crate) use edit::RESERVED_NAMES;
 pub(crate) use load::mesh_faults;
 pub use load::{Scene, SceneSource};
 pub(crate) use parse_shape::{LENGTH_UNITS, pose_of};
+pub use settings_tables::{CouplingSpec, LimitSpec, MethodSpec};
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
-    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HeightMapMapping, HeightMapSpec,
-    LimitSpec, MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, ScenerySpec, Shape,
-    View,
+    BodySpec, HandPathSpec, HeightMapMapping, HeightMapSpec, MassSpec, MotionSpec, ObstacleSpec,
+    ReferencePoint, ScenerySpec, Shape, View,
 };

@@ -2,16 +2,16 @@
 
 use std::cell::RefCell;
 
-use god_object::{Adaptation, RotationMetric, SolverKind};
 use nalgebra::Point3;
 use taut_plant::HandPreset;
 
 use super::edit::object_name;
 use super::parse_look::{appearance, scenery};
 use super::parse_shape::{pose, rotation_of, shape, surface};
+use super::settings_tables::{CouplingSpec, LimitSpec, MethodSpec};
 use super::spec::{
-    AdaptationSpec, BodySpec, CouplingSpec, EnvironmentSpec, HandPathSpec, LimitSpec, MassSpec,
-    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, ScenerySpec, View,
+    BodySpec, EnvironmentSpec, HandPathSpec, MassSpec, MotionSpec, ObstacleSpec, ReferencePoint,
+    ScenerySpec, View,
 };
 use crate::document::{Document, Range, Section, Value};
 use crate::fidelity::FidelitySpec;
@@ -20,8 +20,6 @@ use crate::problem::FileError;
 
 /// Most obstacles: the method counts them in 16 bits.
 const MAX_OBSTACLES: usize = 1 << 16;
-/// Largest capacity or iteration limit. More is a slip of the keyboard.
-const MAX_COUNT: i64 = 1_000_000;
 
 /// What a scene file says.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,9 +54,18 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
     };
     let obstacles = obstacles(&root);
     let scenery = scenery(&root, &obstacles);
-    let coupling = root.section("coupling").map(coupling).unwrap_or_default();
-    let limits = root.section("limits").map(limits).unwrap_or_default();
-    let method = root.section("method").map(method).unwrap_or_default();
+    let coupling = root
+        .section("coupling")
+        .map(CouplingSpec::read)
+        .unwrap_or_default();
+    let limits = root
+        .section("limits")
+        .map(LimitSpec::read)
+        .unwrap_or_default();
+    let method = root
+        .section("method")
+        .map(MethodSpec::read)
+        .unwrap_or_default();
     let hand = root.section("hand").and_then(hand);
     let (view, environment) = root.section("view").map(view).unwrap_or_default();
     let fidelity = fidelity(&root);
@@ -216,76 +223,6 @@ fn motion(section: Section<'_>) -> Option<MotionSpec> {
         repeat,
         at,
     })
-}
-
-fn coupling(section: Section<'_>) -> CouplingSpec {
-    let rotation_metric = match section.get("rotation_metric").map(|node| &node.value) {
-        Some(Value::Text(_)) => {
-            section.choice("rotation_metric", &[("inertia", RotationMetric::Inertia)])
-        }
-        _ => section
-            .number("rotation_metric", Range::Positive)
-            .map(RotationMetric::RadiusOfGyration),
-    };
-    let adaptation = match section.get("adaptation").map(|node| &node.value) {
-        Some(Value::Boolean(false)) => Some(AdaptationSpec::Off),
-        _ => section.section("adaptation").and_then(|table| {
-            let duration = table.required_number("duration", Range::NotNegative, "duration = 0.02");
-            let threshold =
-                table.required_number("threshold", Range::NotPositive, "threshold = -1e-3");
-            table.finish();
-            Some(AdaptationSpec::On(Adaptation {
-                duration: duration?,
-                threshold: threshold?,
-            }))
-        }),
-    };
-    let spec = CouplingSpec {
-        k_s: section.number("k_s", Range::PositiveUpTo(1.0)),
-        k_h: section.number("k_h", Range::Positive),
-        rotation_metric,
-        damping_time: section.number("damping_time", Range::NotNegative),
-        adaptation,
-        look_ahead: section.boolean("look_ahead"),
-        passive: section.boolean("passive"),
-    };
-    section.finish();
-    spec
-}
-
-fn limits(section: Section<'_>) -> LimitSpec {
-    let spec = LimitSpec {
-        force: section.number("force", Range::Positive),
-        torque: section.number("torque", Range::Positive),
-    };
-    section.finish();
-    spec
-}
-
-fn method(section: Section<'_>) -> MethodSpec {
-    let count = |key| section.integer(key, 1, MAX_COUNT);
-    const SOLVERS: [(&str, SolverKind); 2] = [
-        ("active-set", SolverKind::ActiveSet),
-        ("clarabel", SolverKind::Clarabel),
-    ];
-    let spec = MethodSpec {
-        clearance: section.number("clearance", Range::Positive),
-        rest_distance: section.number("rest_distance", Range::Positive),
-        minimum_gap: section.number("minimum_gap", Range::Positive),
-        gap_tolerance: section.number("gap_tolerance", Range::Positive),
-        activation_distance: section.number("activation_distance", Range::Positive),
-        motion_tolerance: section.number("motion_tolerance", Range::Positive),
-        max_constraints: count("max_constraints").map(|n| n as usize),
-        max_substeps: count("max_substeps").map(|n| n as u32),
-        implicit_rounds: section.integer("implicit_rounds", 0, 3).map(|n| n as u32),
-        max_advancement_steps: count("max_advancement_steps").map(|n| n as u32),
-        work_budget: section
-            .integer("work_budget", 1, i64::MAX)
-            .map(|n| n as u64),
-        solver: section.choice("solver", &SOLVERS),
-    };
-    section.finish();
-    spec
 }
 
 fn hand(section: Section<'_>) -> Option<HandPathSpec> {

@@ -1,6 +1,6 @@
 //! A scene as it was written, checked value by value but without its meshes. SI units.
 
-use god_object::{Pose, Primitive, RotationMetric, SolverKind, Surface};
+use god_object::{Pose, Primitive, Surface};
 use nalgebra::{Point3, UnitQuaternion};
 use taut_plant::HandPreset;
 
@@ -212,72 +212,6 @@ pub enum HeightMapMapping {
     },
     /// By the texture coordinates of the mesh file; the picture covers 0 to 1.
     Uv,
-}
-
-/// Constraint adaptation as written.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AdaptationSpec {
-    /// `adaptation = false`.
-    Off,
-    /// `{ duration, threshold }`.
-    On(god_object::Adaptation),
-}
-
-/// `[coupling]`; what is `None` keeps the method's default.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CouplingSpec {
-    /// Share of the pose difference covered in one update.
-    pub k_s: Option<f64>,
-    /// Coupling constant, 1/s^2.
-    pub k_h: Option<f64>,
-    /// The rotational part of the metric.
-    pub rotation_metric: Option<RotationMetric>,
-    /// Damping over stiffness, s.
-    pub damping_time: Option<f64>,
-    /// Constraint adaptation.
-    pub adaptation: Option<AdaptationSpec>,
-    /// Contacts before they touch.
-    pub look_ahead: Option<bool>,
-    /// Bound the energy that the hand takes out.
-    pub passive: Option<bool>,
-}
-
-/// `[limits]`; what is `None` keeps the method's default.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LimitSpec {
-    /// N.
-    pub force: Option<f64>,
-    /// N m.
-    pub torque: Option<f64>,
-}
-
-/// `[method]`: lengths and limits of the method; what is `None` keeps the method's default for the body's size.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MethodSpec {
-    /// Least play that some fit of the scene leaves the body on each side, m: rest distance and what hangs on it follow.
-    pub clearance: Option<f64>,
-    /// m.
-    pub rest_distance: Option<f64>,
-    /// m.
-    pub minimum_gap: Option<f64>,
-    /// m.
-    pub gap_tolerance: Option<f64>,
-    /// m.
-    pub activation_distance: Option<f64>,
-    /// m.
-    pub motion_tolerance: Option<f64>,
-    /// Rows in the constraint set.
-    pub max_constraints: Option<usize>,
-    /// Repetitions within one update.
-    pub max_substeps: Option<u32>,
-    /// Rounds of implicit constraints, 0 to 3.
-    pub implicit_rounds: Option<u32>,
-    /// Evaluations in one collision search.
-    pub max_advancement_steps: Option<u32>,
-    /// Nominal microseconds of work of one update.
-    pub work_budget: Option<u64>,
-    /// Solver of the projections.
-    pub solver: Option<SolverKind>,
 }
 
 /// `[hand]`: what the simulated hand intends.

@@ -1,0 +1,141 @@
+//! The tables that set the method's [`Settings`]: `[coupling]`, `[limits]`, `[method]`. Each key is declared once, here: type, reader, and the setting
+//! that it overrides.
+
+use god_object::{Adaptation, RotationMetric, Settings, SolverKind};
+
+use crate::document::{Range, Section, Value};
+
+/// Largest capacity or iteration limit. More is a slip of the keyboard.
+const MAX_COUNT: i64 = 1_000_000;
+
+/// Declares a table: `key: type = reader => setting;`. A key without a setting is used elsewhere.
+macro_rules! settings_table {
+    (
+        $(#[$about:meta])*
+        pub struct $Table:ident { $( $(#[$what:meta])* pub $key:ident: $kind:ty = $read:expr $(=> $setting:ident)?; )* }
+    ) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct $Table { $( $(#[$what])* pub $key: Option<$kind>, )* }
+
+        impl $Table {
+            /// The table as it is written.
+            pub(super) fn read(section: Section<'_>) -> Self {
+                let table = Self { $( $key: ($read)(&section, stringify!($key)), )* };
+                section.finish();
+                table
+            }
+
+            /// Overrides the settings whose keys are written.
+            pub(super) fn apply(&self, settings: &mut Settings) {
+                $( $( if let Some(value) = self.$key { settings.$setting = value; } )? )*
+            }
+        }
+    };
+}
+
+settings_table! {
+    /// `[coupling]`; what is `None` keeps the method's default.
+    pub struct CouplingSpec {
+        /// The rotational part of the metric.
+        pub rotation_metric: RotationMetric = rotation_metric => rotation_metric;
+        /// Constraint adaptation; `Some(None)` is `adaptation = false`.
+        pub adaptation: Option<Adaptation> = adaptation => adaptation;
+        /// Share of the pose difference covered in one update.
+        pub k_s: f64 = number(Range::PositiveUpTo(1.0)) => k_s;
+        /// Coupling constant, 1/s^2.
+        pub k_h: f64 = number(Range::Positive) => k_h;
+        /// Damping over stiffness, s.
+        pub damping_time: f64 = number(Range::NotNegative) => damping_time;
+        /// Contacts before they touch.
+        pub look_ahead: bool = Section::boolean => look_ahead;
+        /// Bound the energy that the hand takes out.
+        pub passive: bool = Section::boolean => passive;
+    }
+}
+
+settings_table! {
+    /// `[limits]`; what is `None` keeps the method's default.
+    pub struct LimitSpec {
+        /// N.
+        pub force: f64 = number(Range::Positive) => force_limit;
+        /// N m.
+        pub torque: f64 = number(Range::Positive) => torque_limit;
+    }
+}
+
+settings_table! {
+    /// `[method]`: lengths and limits of the method; what is `None` keeps the method's default for the body's size.
+    pub struct MethodSpec {
+        /// Least play that some fit of the scene leaves the body on each side, m: rest distance and what hangs on it follow.
+        pub clearance: f64 = number(Range::Positive);
+        /// m.
+        pub rest_distance: f64 = number(Range::Positive) => rest_distance;
+        /// m.
+        pub minimum_gap: f64 = number(Range::Positive) => minimum_gap;
+        /// m.
+        pub gap_tolerance: f64 = number(Range::Positive) => gap_tolerance;
+        /// m.
+        pub activation_distance: f64 = number(Range::Positive) => activation_distance;
+        /// m.
+        pub motion_tolerance: f64 = number(Range::Positive) => motion_tolerance;
+        /// Rows in the constraint set.
+        pub max_constraints: usize = integer(1, MAX_COUNT, |n| n as usize) => max_constraints;
+        /// Repetitions within one update.
+        pub max_substeps: u32 = integer(1, MAX_COUNT, |n| n as u32) => max_substeps;
+        /// Rounds of implicit constraints, 0 to 3.
+        pub implicit_rounds: u32 = integer(0, 3, |n| n as u32) => implicit_rounds;
+        /// Evaluations in one collision search.
+        pub max_advancement_steps: u32 = integer(1, MAX_COUNT, |n| n as u32) => max_advancement_steps;
+        /// Nominal microseconds of work of one update.
+        pub work_budget: Option<u64> = integer(1, i64::MAX, |n| Some(n as u64)) => work_budget;
+        /// Solver of the projections.
+        pub solver: SolverKind = solver => solver;
+    }
+}
+
+fn number(range: Range) -> impl Fn(&Section<'_>, &'static str) -> Option<f64> {
+    move |section, key| section.number(key, range)
+}
+
+/// A whole number from `low` to `high`.
+fn integer<T>(
+    low: i64,
+    high: i64,
+    convert: fn(i64) -> T,
+) -> impl Fn(&Section<'_>, &'static str) -> Option<T> {
+    move |section, key| section.integer(key, low, high).map(convert)
+}
+
+fn rotation_metric(section: &Section<'_>, key: &'static str) -> Option<RotationMetric> {
+    match section.get(key).map(|node| &node.value) {
+        Some(Value::Text(_)) => section.choice(key, &[("inertia", RotationMetric::Inertia)]),
+        _ => section
+            .number(key, Range::Positive)
+            .map(RotationMetric::RadiusOfGyration),
+    }
+}
+
+fn adaptation(section: &Section<'_>, key: &'static str) -> Option<Option<Adaptation>> {
+    if let Some(Value::Boolean(false)) = section.get(key).map(|node| &node.value) {
+        return Some(None);
+    }
+    let table = section.section(key)?;
+    let duration = table.required_number("duration", Range::NotNegative, "duration = 0.02");
+    let threshold = table.required_number("threshold", Range::NotPositive, "threshold = -1e-3");
+    table.finish();
+    Some(Some(Adaptation {
+        duration: duration?,
+        threshold: threshold?,
+    }))
+}
+
+fn solver(section: &Section<'_>, key: &'static str) -> Option<SolverKind> {
+    section.choice(
+        key,
+        &[
+            ("active-set", SolverKind::ActiveSet),
+            ("clarabel", SolverKind::Clarabel),
+        ],
+    )
+}
