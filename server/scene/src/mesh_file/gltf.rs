@@ -243,19 +243,8 @@ fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, 
     Ok(all)
 }
 
-fn append(
-    mesh: &mut RawMesh,
-    coordinates: Option<&mut Vec<CornerCoordinates>>,
-    primitive: &gltf::Primitive<'_>,
-    world_from_node: &Matrix4<f64>,
-    buffers: &[Vec<u8>],
-) -> Result<(), String> {
-    if !matches!(
-        primitive.mode(),
-        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
-    ) {
-        return Err("is no triangles (points or lines); remove it".into());
-    }
+/// Positions are three floats for a vertex, indices unsigned integers, and both lie within their buffers.
+fn check_layout(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) -> Result<(), String> {
     let positions = primitive
         .get(&gltf::Semantic::Positions)
         .ok_or("has no positions; remove it")?;
@@ -275,6 +264,24 @@ fn append(
             return Err("has indices that are no unsigned integers; export it again".into());
         }
     }
+    Ok(())
+}
+
+/// Adds a primitive's vertices and triangles to `mesh`, and their texture coordinates to `coordinates` where those are wanted.
+fn append(
+    mesh: &mut RawMesh,
+    coordinates: Option<&mut Vec<CornerCoordinates>>,
+    primitive: &gltf::Primitive<'_>,
+    world_from_node: &Matrix4<f64>,
+    buffers: &[Vec<u8>],
+) -> Result<(), String> {
+    if !matches!(
+        primitive.mode(),
+        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+    ) {
+        return Err("is no triangles (points or lines); remove it".into());
+    }
+    check_layout(primitive, buffers)?;
     let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
     let first = mesh.vertices.len();
     for (number, position) in reader
@@ -438,184 +445,5 @@ fn decode_base64(text: &str) -> Option<Vec<u8>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn parse(bytes: &[u8], directory: Option<&Path>) -> Result<RawMesh, Fault> {
-        super::parse(bytes, directory, &mut Materials::default())
-    }
-
-    /// One triangle in a data URI; indices in the first 8 bytes, positions after.
-    fn triangle(node: &str, last_index: u16) -> String {
-        let mut bytes = Vec::new();
-        for index in [0, 1, last_index, 0] {
-            bytes.extend(index.to_le_bytes());
-        }
-        for coordinate in [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0] {
-            bytes.extend(coordinate.to_le_bytes());
-        }
-        let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-        let mut data = String::new();
-        for chunk in bytes.chunks(3) {
-            let mut word = [0; 3];
-            word[..chunk.len()].copy_from_slice(chunk);
-            let bits = u32::from_be_bytes([0, word[0], word[1], word[2]]);
-            for i in 0..=chunk.len() {
-                data.push(char::from(alphabet[(bits >> (18 - 6 * i)) as usize & 63]));
-            }
-        }
-        format!(
-            r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0{node}}}],
-            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":1}},"indices":0}}]}}],
-            "buffers":[{{"uri":"data:application/octet-stream;base64,{data}","byteLength":44}}],
-            "bufferViews":[{{"buffer":0,"byteOffset":0,"byteLength":6}},{{"buffer":0,"byteOffset":8,"byteLength":36}}],
-            "accessors":[{{"bufferView":0,"componentType":5123,"count":3,"type":"SCALAR"}},
-            {{"bufferView":1,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}]}}"#
-        )
-    }
-
-    /// Found by fuzzing: the crate's reader took the header's length for longer than the header.
-    #[test]
-    fn a_container_shorter_than_its_header_is_refused() {
-        for length in [0_u32, 11, 12, 19, 40, u32::MAX] {
-            let bytes = [b"glTF\x02\0\0\0", &length.to_le_bytes()[..], &[0; 27]].concat();
-            let fault = parse(&bytes, None).expect_err("no chunk");
-            assert!(fault.text.starts_with("is no valid GLB"), "{}", fault.text);
-        }
-    }
-
-    /// Found by fuzzing: the crate's validation indexed the accessors without a look at their number.
-    #[test]
-    fn positions_in_an_accessor_that_is_not_there_are_refused() {
-        let text = r#"{"asset":{"version":"2.0"},"meshes":[{"primitives":[{"attributes":{"POSITION":2}}]}]}"#;
-        let fault = parse(text.as_bytes(), None).expect_err("no accessors");
-        assert_eq!(
-            fault.text,
-            "has positions in accessor 2, but 0 accessors; export it again"
-        );
-    }
-
-    #[test]
-    fn node_transforms_are_applied() {
-        let mesh = parse(
-            triangle(r#","translation":[0,0,5],"scale":[2,2,2]"#, 2).as_bytes(),
-            None,
-        )
-        .unwrap();
-        assert_eq!(mesh.vertices[1], Point3::new(2.0, 0.0, 5.0));
-        assert_eq!(mesh.triangles, [[0, 1, 2]]);
-    }
-
-    #[test]
-    fn a_mirroring_node_keeps_the_outside_outside() {
-        let mesh = parse(triangle(r#","scale":[-1,1,1]"#, 2).as_bytes(), None).unwrap();
-        assert_eq!(mesh.triangles, [[0, 2, 1]]);
-    }
-
-    #[test]
-    fn texture_coordinates_go_with_their_corners() {
-        // The file's floats, read in pairs, serve as coordinates.
-        let with_coordinates = |node: &str| {
-            triangle(node, 2)
-                .replace("\"POSITION\":1", "\"POSITION\":1,\"TEXCOORD_0\":2")
-                .replace(
-                    "\"byteLength\":36}",
-                    "\"byteLength\":36},{\"buffer\":0,\"byteOffset\":8,\"byteLength\":24}",
-                )
-                .replace(
-                    "\"max\":[1,1,0]}",
-                    "\"max\":[1,1,0]},{\"bufferView\":2,\"componentType\":5126,\"count\":3,\"type\":\"VEC2\"}",
-                )
-        };
-        let read = |text: String| parse_texture_coordinates(text.as_bytes(), None);
-        assert_eq!(
-            read(with_coordinates("")).unwrap(),
-            [[[0.0, 0.0], [0.0, 1.0], [0.0, 0.0]]]
-        );
-        // As the corners are exchanged, so are theirs.
-        assert_eq!(
-            read(with_coordinates(r#","scale":[-1,1,1]"#)).unwrap(),
-            [[[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]]
-        );
-        let fault = read(triangle("", 2)).unwrap_err();
-        assert!(
-            fault
-                .text
-                .contains("mesh 0 primitive 0: has no texture coordinates"),
-            "{}",
-            fault.text
-        );
-    }
-
-    #[test]
-    fn an_index_out_of_range_is_named() {
-        let text = parse(triangle("", 7).as_bytes(), None).unwrap_err().text;
-        assert_eq!(
-            text,
-            "mesh 0 primitive 0: an index is 7, but there are 3 vertices; export it again"
-        );
-    }
-
-    #[test]
-    fn a_buffer_elsewhere_is_refused() {
-        let text = triangle("", 2);
-        let (head, tail) = text.split_once("data:").unwrap();
-        let (_, tail) = tail.split_once('"').unwrap();
-        let text = parse(
-            format!("{head}../secret.bin\"{tail}").as_bytes(),
-            Some(Path::new(".")),
-        )
-        .unwrap_err()
-        .text;
-        assert_eq!(
-            text,
-            "buffer 0 is `../secret.bin`, but must lie beside the file; export it as .glb"
-        );
-    }
-
-    #[test]
-    fn a_buffer_beside_the_file_may_have_a_name_that_is_encoded() {
-        let text = triangle("", 2);
-        let (head, tail) = text.split_once("data:").unwrap();
-        let (data, tail) = tail.split_once('"').unwrap();
-        let bytes = decode_base64(data.split_once(',').unwrap().1).unwrap();
-        let directory = tempfile::tempdir().unwrap();
-        std::fs::write(directory.path().join("a b.bin"), bytes).unwrap();
-        let read = |uri: &str| {
-            parse(
-                format!("{head}{uri}\"{tail}").as_bytes(),
-                Some(directory.path()),
-            )
-        };
-        assert_eq!(read("a%20b.bin").unwrap().triangles, [[0, 1, 2]]);
-        let text = read("%2E%2E/a%20b.bin").unwrap_err().text;
-        assert!(text.contains("must lie beside the file"), "{text}");
-    }
-
-    #[test]
-    fn morph_targets_are_refused_where_they_have_weights() {
-        let with_targets = |node: &str| {
-            triangle(node, 2).replace(
-                "\"indices\":0",
-                "\"indices\":0,\"targets\":[{\"POSITION\":1}]",
-            )
-        };
-        assert!(parse(with_targets("").as_bytes(), None).is_ok());
-        assert!(parse(with_targets(r#","weights":[0.0]"#).as_bytes(), None).is_ok());
-        let text = parse(with_targets(r#","weights":[0.5]"#).as_bytes(), None)
-            .unwrap_err()
-            .text;
-        assert!(text.starts_with("mesh 0 has morph targets"), "{text}");
-    }
-
-    #[test]
-    fn an_accessor_past_its_buffer_is_refused() {
-        let text =
-            triangle("", 2).replace(r#""count":3,"type":"VEC3""#, r#""count":4,"type":"VEC3""#);
-        let text = parse(text.as_bytes(), None).unwrap_err().text;
-        assert_eq!(
-            text,
-            "mesh 0 primitive 0: accessor 1 reaches past its buffer; export the file again"
-        );
-    }
-}
+#[path = "gltf_tests.rs"]
+mod tests;

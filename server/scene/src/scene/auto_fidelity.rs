@@ -11,7 +11,7 @@ use crate::fidelity::decide::Parts;
 use crate::fidelity::errors::{JND_CHANGE, JND_MAGNITUDE, direction_jnd};
 use crate::fidelity::need::{CREASE, volume};
 use crate::fidelity::{
-    BodyNeed, Choice, FidelityPlan, FidelitySpec, Fixed, Origin, SceneNeed, decide,
+    BodyNeed, Choice, Chosen, FidelityPlan, FidelitySpec, Fixed, Origin, SceneNeed, decide,
 };
 use crate::trace::DeviceTrace;
 
@@ -75,40 +75,7 @@ impl Scene {
             mesh_errors: shapes.iter().map(|shape| simplify_of(shape)).collect(),
         };
         let chosen = decide(&need, &fixed, spec.budget_j, spec.time_us);
-        let parts = Parts::of(
-            &need,
-            chosen.rate,
-            chosen.gap_tolerance,
-            chosen.rounds,
-            &chosen.mesh_errors,
-        );
-        let mut choices = Vec::new();
-        choices.push(rate_choice(
-            &need,
-            &parts,
-            chosen.rate,
-            fixed.rate.is_some(),
-        ));
-        choices.push(choice(
-            "method.gap_tolerance",
-            format!("{:.1e} m", chosen.gap_tolerance),
-            fixed.gap_tolerance.is_some(),
-            format!(
-                "{:.0} N/m make {:.4} J of it",
-                need.stiffness, parts.tolerance
-            ),
-        ));
-        choices.push(choice(
-            "method.implicit_rounds",
-            chosen.rounds.to_string(),
-            fixed.rounds.is_some(),
-            format!(
-                "points {:.1} mm from where the body turns, at {:.2} rad/s, leave their rows by {:.3} J",
-                need.lever * 1e3,
-                need.turn_rate,
-                parts.linearisation
-            ),
-        ));
+        let mut choices = method_choices(&need, &chosen, &fixed);
         let bodies = || std::iter::once(&need.body).chain(&need.obstacles);
         let mut mesh_errors = Vec::new();
         for ((body, error), fixed) in bodies().zip(&chosen.mesh_errors).zip(&fixed.mesh_errors) {
@@ -119,29 +86,7 @@ impl Scene {
             }
             mesh_errors.push(Some(*error).filter(|e| fixed.is_none() && *e > 0.0));
         }
-        let mut shading = Vec::new();
-        for (o, body) in self.spec.obstacles.iter().zip(&need.obstacles) {
-            let error = chosen.mesh_errors[shading.len() + 1];
-            let angle = body
-                .facet_angle
-                .max(crate::fidelity::errors::facet_angle(error, body.curvature));
-            let felt = direction_jnd(0.5 * angle);
-            let wanted = body.shadable && o.surface.shading.is_none() && felt > spec.budget_j;
-            if o.surface.shading.is_some() || body.shadable {
-                let set = o.surface.shading.is_some();
-                let value = if set || wanted { "on" } else { "off" };
-                choices.push(choice(
-                    &format!("surface.shading of \"{}\"", o.name),
-                    value.to_owned(),
-                    set,
-                    format!(
-                        "its facets meet at {:.1} degrees, {felt:.2} J from the surface they stand for",
-                        angle.to_degrees()
-                    ),
-                ));
-            }
-            shading.push(wanted);
-        }
+        let shading = self.shading(&need, &chosen.mesh_errors, spec.budget_j, &mut choices);
         let (broadcast_rate, contacts) = published(&spec, &need, &mut choices);
         Some(AutoFidelity {
             gap_tolerance: chosen.gap_tolerance,
@@ -161,6 +106,40 @@ impl Scene {
                 choices,
             },
         })
+    }
+
+    /// For each obstacle, whether its facets would be felt and are to be shaded.
+    fn shading(
+        &self,
+        need: &SceneNeed,
+        mesh_errors: &[f64],
+        budget_j: f64,
+        choices: &mut Vec<Choice>,
+    ) -> Vec<bool> {
+        let mut shading = Vec::new();
+        for (o, body) in self.spec.obstacles.iter().zip(&need.obstacles) {
+            let error = mesh_errors[shading.len() + 1];
+            let angle = body
+                .facet_angle
+                .max(crate::fidelity::errors::facet_angle(error, body.curvature));
+            let felt = direction_jnd(0.5 * angle);
+            let set = o.surface.shading.is_some();
+            let wanted = body.shadable && !set && felt > budget_j;
+            if set || body.shadable {
+                let value = if set || wanted { "on" } else { "off" };
+                choices.push(choice(
+                    &format!("surface.shading of \"{}\"", o.name),
+                    value.to_owned(),
+                    set,
+                    format!(
+                        "its facets meet at {:.1} degrees, {felt:.2} J from the surface they stand for",
+                        angle.to_degrees()
+                    ),
+                ));
+            }
+            shading.push(wanted);
+        }
+        shading
     }
 
     fn shapes(&self) -> Vec<&Shape> {
@@ -264,6 +243,40 @@ fn choice(key: &str, value: String, set: bool, reason: String) -> Choice {
         origin: if set { Origin::Set } else { Origin::Auto },
         reason,
     }
+}
+
+/// Rate and settings of the method, each with its share of the error.
+fn method_choices(need: &SceneNeed, chosen: &Chosen, fixed: &Fixed) -> Vec<Choice> {
+    let parts = Parts::of(
+        need,
+        chosen.rate,
+        chosen.gap_tolerance,
+        chosen.rounds,
+        &chosen.mesh_errors,
+    );
+    vec![
+        rate_choice(need, &parts, chosen.rate, fixed.rate.is_some()),
+        choice(
+            "method.gap_tolerance",
+            format!("{:.1e} m", chosen.gap_tolerance),
+            fixed.gap_tolerance.is_some(),
+            format!(
+                "{:.0} N/m make {:.4} J of it",
+                need.stiffness, parts.tolerance
+            ),
+        ),
+        choice(
+            "method.implicit_rounds",
+            chosen.rounds.to_string(),
+            fixed.rounds.is_some(),
+            format!(
+                "points {:.1} mm from where the body turns, at {:.2} rad/s, leave their rows by {:.3} J",
+                need.lever * 1e3,
+                need.turn_rate,
+                parts.linearisation
+            ),
+        ),
+    ]
 }
 
 fn rate_choice(need: &SceneNeed, parts: &Parts, rate: f64, set: bool) -> Choice {
