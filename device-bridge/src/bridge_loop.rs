@@ -15,7 +15,9 @@ use crate::device::DeviceFault;
 use crate::edge::{BrokenSet, EdgeCoupler, PassedWrench};
 use crate::external::ExternalWrenchStatistics;
 use crate::own_stamps::OwnStamps;
-use crate::port::{Command, CommandSource, DevicePort, EdgeDetector, Events, Passivity};
+use crate::port::{
+    Command, CommandSource, DevicePort, EdgeDetector, Events, Passivity, TickReport,
+};
 use crate::report::Durations;
 
 /// The newest command, and when the device was read for what it comes from.
@@ -269,22 +271,8 @@ impl BridgeLoop {
             })
         });
 
-        let wrench = &report.wrench;
-        self.stats.max_force = self.stats.max_force.max(wrench.fixed_rows::<3>(0).norm());
-        self.stats.max_torque = self.stats.max_torque.max(wrench.fixed_rows::<3>(3).norm());
-        if let Some(origin) = self.port.origin()
-            && *wrench != Vector6::zeros()
-        {
-            let age = now.saturating_sub(origin);
-            self.stats.max_force_age = self.stats.max_force_age.max(age);
-        }
-        self.stats.safety_events += report
-            .events
-            .iter()
-            .filter(|event| !event.kind.is_good_news())
-            .count() as u64;
+        self.note(now, &report);
         let reading = &report.reading;
-        self.stats.faulty_ticks += u64::from(reading.fault.is_some());
         let sample = &reading.sample;
         let age = match reading.fault {
             None => now.saturating_sub(sample.time).as_nanos() as u64,
@@ -306,6 +294,21 @@ impl BridgeLoop {
             },
             events: report.events,
         }
+    }
+
+    /// Counts what a tick of the port did.
+    fn note(&mut self, now: Duration, report: &TickReport) {
+        let (stats, wrench) = (&mut self.stats, &report.wrench);
+        stats.max_force = stats.max_force.max(wrench.fixed_rows::<3>(0).norm());
+        stats.max_torque = stats.max_torque.max(wrench.fixed_rows::<3>(3).norm());
+        if let Some(origin) = self.port.origin()
+            && *wrench != Vector6::zeros()
+        {
+            stats.max_force_age = stats.max_force_age.max(now.saturating_sub(origin));
+        }
+        let events = report.events.iter();
+        stats.safety_events += events.filter(|e| !e.kind.is_good_news()).count() as u64;
+        stats.faulty_ticks += u64::from(report.reading.fault.is_some());
     }
 
     /// Takes a command that is newer than the last one, if it says what it comes from.

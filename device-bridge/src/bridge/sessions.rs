@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -186,21 +186,8 @@ impl Run<'_> {
         mut bridge: BridgeLoop,
     ) -> Result<(BridgeLoop, SessionEnd), BridgeError> {
         let link = Arc::new(link);
-        let end_loop = Arc::new(AtomicBool::new(false));
         let (sender, notices) = sync_channel(NOTICES);
         let period = Duration::from_secs_f64(1.0 / self.args.rate);
-        let mut device_loop = DeviceLoop {
-            link: Arc::clone(&link),
-            end: Arc::clone(&end_loop),
-            asked: self.over.end.clone(),
-            wishes: Arc::clone(&self.wishes),
-            turns: self.over.alive.device.clone(),
-            notices: sender,
-            period,
-            priority: self.args.priority,
-            core: self.args.core,
-            totals: std::mem::replace(&mut self.totals, Totals::new()),
-        };
         let source = match self.epoch.replace(link.epoch()) {
             Some(epoch) if epoch == link.epoch() => CommandSource::Same,
             _ => CommandSource::Other,
@@ -208,20 +195,7 @@ impl Run<'_> {
         let edge = edge_coupler(self.args.coupling, link.coupling())?
             .map(|coupler| coupler.within(period));
         bridge.begin_session(source, edge);
-        let thread = thread::Builder::new()
-            .name("taut-bridge-dev".to_owned())
-            .spawn(move || {
-                device_loop.run(&mut bridge);
-                (bridge, device_loop.totals)
-            })
-            .map_err(|cause| BridgeError::Thread {
-                what: "the device loop",
-                cause,
-            })?;
-        let thread = LoopThread {
-            end: end_loop,
-            thread: Some(thread),
-        };
+        let thread = self.start_device_loop(&link, bridge, period, sender)?;
 
         let dead_after = self.rejoiner.policy().dead_after;
         let mut watch = LinkWatch::new(Instant::now(), dead_after.unwrap_or(link.node_timeout()));
@@ -255,6 +229,43 @@ impl Run<'_> {
             _ => SessionEnd::Signal,
         });
         Ok((bridge, end))
+    }
+
+    /// Starts the thread that ticks `bridge`. It has the totals until it ends.
+    fn start_device_loop(
+        &mut self,
+        link: &Arc<ClientLink>,
+        mut bridge: BridgeLoop,
+        period: Duration,
+        notices: SyncSender<Notice>,
+    ) -> Result<LoopThread<(BridgeLoop, Totals)>, BridgeError> {
+        let end_loop = Arc::new(AtomicBool::new(false));
+        let mut device_loop = DeviceLoop {
+            link: Arc::clone(link),
+            end: Arc::clone(&end_loop),
+            asked: self.over.end.clone(),
+            wishes: Arc::clone(&self.wishes),
+            turns: self.over.alive.device.clone(),
+            notices,
+            period,
+            priority: self.args.priority,
+            core: self.args.core,
+            totals: std::mem::replace(&mut self.totals, Totals::new()),
+        };
+        let thread = thread::Builder::new()
+            .name("taut-bridge-dev".to_owned())
+            .spawn(move || {
+                device_loop.run(&mut bridge);
+                (bridge, device_loop.totals)
+            })
+            .map_err(|cause| BridgeError::Thread {
+                what: "the device loop",
+                cause,
+            })?;
+        Ok(LoopThread {
+            end: end_loop,
+            thread: Some(thread),
+        })
     }
 
     fn session_end(

@@ -9,8 +9,8 @@ use std::{
     time::Instant,
 };
 use taut_proto::{
-    Assembler, ClockFilter, ConstraintSet, DecodeError, EventBatch, EventInbox, PartTaken,
-    PassedForce, Payload, Role, SessionTime,
+    Assembler, ClockFilter, ConstraintPart, ConstraintSet, DecodeError, EventBatch, EventInbox,
+    PartTaken, PassedForce, Payload, Role, SessionTime,
     confirmation::{Trust, Unconfirmed},
     path::PathToken,
     seal::{OpenError, Opened, Opener},
@@ -266,37 +266,14 @@ impl Inner {
         let sequence = opened.header.sequence;
         match opened.payload {
             Payload::Hot(state) => {
-                counters.states.one();
-                // An event of the group is nobody's word: the control stream tells the server's.
-                if provenance == Provenance::Session {
-                    self.events.repeated(&state.events);
-                }
-                // Newest wins: a state that others overtook is of no use to a picture, and ticks stay in order.
-                match self.newest_tick {
-                    Some(newest) if newest > state.tick => return counters.late.one(),
-                    // By the other path already.
-                    Some(newest) if newest == state.tick => return counters.duplicates.one(),
-                    _ => self.newest_tick = Some(state.tick),
-                }
-                if provenance == Provenance::Group {
-                    let waiting = &mut self.grouped.unconfirmed;
-                    let trust = waiting.take(state.tick, opened.state_hash, local_ns);
-                    self.judge(trust);
-                    if !self.grouped.follows {
-                        return;
-                    }
-                }
-                if self.states.len() == MAX_QUEUED_STATES {
-                    self.states.pop_front();
-                    counters.overrun.one();
-                }
-                self.states.push_back(ReceivedState {
+                let state = ReceivedState {
                     state,
                     sequence,
                     received,
                     state_hash: opened.state_hash,
                     provenance,
-                });
+                };
+                self.take_state(state, local_ns, counters);
             }
             Payload::Confirm(confirmation) => {
                 if self.grouped.follows {
@@ -318,18 +295,7 @@ impl Inner {
                     });
                 }
             }
-            Payload::Constraints(part) => match &mut self.sets {
-                Some(sets) => match sets.assembler.take(&part) {
-                    PartTaken::Whole => {
-                        counters.sets.one();
-                        sets.confirmed = Some(received);
-                    }
-                    PartTaken::Repeated => sets.confirmed = Some(received),
-                    PartTaken::Waiting | PartTaken::Overtaken => {}
-                    PartTaken::Refused => counters.garbage.one(),
-                },
-                None => counters.garbage.one(),
-            },
+            Payload::Constraints(part) => self.take_set_part(&part, received, counters),
             // A bridge has constraint sets, and nobody else a hand to push.
             Payload::PassedForce(force) if self.sets.is_some() => {
                 if self.force.is_none_or(|(last, _)| last < sequence) {
@@ -348,6 +314,56 @@ impl Inner {
             | Payload::PathResponse(_)
             | Payload::EventAck(_) => counters.garbage.one(),
             Payload::Release(_) => {} // taken before
+        }
+    }
+
+    /// Newest wins: a state that others overtook is of no use to a picture, and ticks stay in order.
+    fn take_state(&mut self, came: ReceivedState, local_ns: u64, counters: &ClientCounterCells) {
+        counters.states.one();
+        let (tick, provenance) = (came.state.tick, came.provenance);
+        // An event of the group is nobody's word: the control stream tells the server's.
+        if provenance == Provenance::Session {
+            self.events.repeated(&came.state.events);
+        }
+        match self.newest_tick {
+            Some(newest) if newest > tick => return counters.late.one(),
+            // By the other path already.
+            Some(newest) if newest == tick => return counters.duplicates.one(),
+            _ => self.newest_tick = Some(tick),
+        }
+        if provenance == Provenance::Group {
+            let waiting = &mut self.grouped.unconfirmed;
+            let trust = waiting.take(tick, came.state_hash, local_ns);
+            self.judge(trust);
+            if !self.grouped.follows {
+                return;
+            }
+        }
+        if self.states.len() == MAX_QUEUED_STATES {
+            self.states.pop_front();
+            counters.overrun.one();
+        }
+        self.states.push_back(came);
+    }
+
+    /// A part of a constraint set, which only a bridge has.
+    fn take_set_part(
+        &mut self,
+        part: &ConstraintPart,
+        received: Instant,
+        counters: &ClientCounterCells,
+    ) {
+        let Some(sets) = &mut self.sets else {
+            return counters.garbage.one();
+        };
+        match sets.assembler.take(part) {
+            PartTaken::Whole => {
+                counters.sets.one();
+                sets.confirmed = Some(received);
+            }
+            PartTaken::Repeated => sets.confirmed = Some(received),
+            PartTaken::Waiting | PartTaken::Overtaken => {}
+            PartTaken::Refused => counters.garbage.one(),
         }
     }
 

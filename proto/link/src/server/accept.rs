@@ -26,7 +26,7 @@ use taut_proto::{
     },
     membership::Pace,
     proof::{Claim, Grant, JoinSecret},
-    revocation::ShutOut,
+    revocation::{JoinPolicy, ShutOut},
 };
 use tokio::time::{sleep, timeout};
 
@@ -155,13 +155,17 @@ async fn join(
     Some((entry, send, recv))
 }
 
-/// The secret that the client has proven, and whether it is of the second cluster key.
-fn proven_secret(shared: &Shared, hello: &Hello, binding: &[u8; 32]) -> Option<(JoinSecret, bool)> {
-    let claim = Claim {
+fn claim_of(hello: &Hello) -> Claim<'_> {
+    Claim {
         role: hello.role,
         node: hello.node.raw(),
         grant: hello.grant,
-    };
+    }
+}
+
+/// The secret that the client has proven, and whether it is of the second cluster key.
+fn proven_secret(shared: &Shared, hello: &Hello, binding: &[u8; 32]) -> Option<(JoinSecret, bool)> {
+    let claim = claim_of(hello);
     let also = shared.also.as_ref().filter(|also| also.counts());
     let keys = [Some(&shared.key), also.map(|also| &also.key)];
     keys.into_iter()
@@ -171,41 +175,21 @@ fn proven_secret(shared: &Shared, hello: &Hello, binding: &[u8; 32]) -> Option<(
         .find(|(secret, _)| secret.verify_client(&hello.proof, binding, claim))
 }
 
-/// Checks a Hello and makes the session.
-fn admit(
-    shared: &Arc<Shared>,
-    connection: &Connection,
-    hello: Hello,
-    attempt: &mut Joining,
-) -> Result<(Arc<Session>, Welcome), Refused> {
-    let bad = |text: String| (RefusalCode::BadHello, text);
-    let binding = binding::proof_binding(connection).map_err(|error| bad(error.to_string()))?;
-    let claim = Claim {
-        role: hello.role,
-        node: hello.node.raw(),
-        grant: hello.grant,
-    };
-    let Some((secret, by_also_key)) = proven_secret(shared, &hello, &binding) else {
-        shared.counters.wrong_key.one();
-        let text = "its secret is not one of this workbench: its cluster key or credential (--key) is damaged or forged, make it again with `taut keys`";
-        return Err((RefusalCode::WrongKey, text.to_owned()));
-    };
-    if !attempt.proven() {
-        return Err(bad("it came too late among many: try again".to_owned()));
-    }
-    // From here on the name is one that may be shown, whatever it is part of.
-    let name = hello.node.raw();
-    if name.trim().is_empty() || name.len() > MAX_NODE_NAME_BYTES || !hello.node.is_printable() {
+fn check_name(node: &Untrusted) -> Result<(), Refused> {
+    let name = node.raw();
+    if name.trim().is_empty() || name.len() > MAX_NODE_NAME_BYTES || !node.is_printable() {
         let text = format!(
             "a node's name has 1 to {MAX_NODE_NAME_BYTES} printable bytes: choose another (--node)"
         );
-        return Err(bad(text));
+        return Err((RefusalCode::BadHello, text));
     }
-    let Some(version) = shared.versions.highest_common(hello.versions) else {
-        return Err(bad("it speaks no version that is spoken here".to_owned())); // told when it was read
-    };
-    let policy = lock(&shared.policy);
-    policy.check(claim).map_err(|shut_out| {
+    Ok(())
+}
+
+/// Refuses whom the workbench does not let in, and who would take a screen's name.
+fn check_rules(shared: &Shared, policy: &JoinPolicy, hello: &Hello) -> Result<(), Refused> {
+    let name = hello.node.raw();
+    policy.check(claim_of(hello)).map_err(|shut_out| {
         shared.counters.shut_out.one();
         let code = match shut_out {
             ShutOut::Role(_) => RefusalCode::RoleClosed,
@@ -225,6 +209,36 @@ fn admit(
         );
         return Err((RefusalCode::NameTaken, text));
     }
+    Ok(())
+}
+
+/// Checks a Hello and makes the session.
+fn admit(
+    shared: &Arc<Shared>,
+    connection: &Connection,
+    hello: Hello,
+    attempt: &mut Joining,
+) -> Result<(Arc<Session>, Welcome), Refused> {
+    let bad = |text: String| (RefusalCode::BadHello, text);
+    let binding = binding::proof_binding(connection).map_err(|error| bad(error.to_string()))?;
+    let claim = claim_of(&hello);
+    let Some((secret, by_also_key)) = proven_secret(shared, &hello, &binding) else {
+        shared.counters.wrong_key.one();
+        let text = "its secret is not one of this workbench: its cluster key or credential (--key) is damaged or forged, make it again with `taut keys`";
+        return Err((RefusalCode::WrongKey, text.to_owned()));
+    };
+    if !attempt.proven() {
+        return Err(bad("it came too late among many: try again".to_owned()));
+    }
+    // From here on the name is one that may be shown, whatever it is part of.
+    check_name(&hello.node)?;
+    let Some(version) = shared.versions.highest_common(hello.versions) else {
+        return Err(bad("it speaks no version that is spoken here".to_owned())); // told when it was read
+    };
+    // Held until the session is there: a revocation meanwhile waits, and then finds it.
+    let policy = lock(&shared.policy);
+    check_rules(shared, &policy, &hello)?;
+    let name = hello.node.raw();
     let now_ns = shared.clock.now_ns();
     let Admission { session, replaced } =
         shared.sessions.admit(name, hello.role, now_ns, |number| {

@@ -143,19 +143,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         quic_sender: QuicSender::default(),
         stopping: AtomicBool::new(false),
     });
-    let bodies: [(_, ThreadBody); 2] = [
-        ("taut-udp", receive::run_udp),
-        ("taut-quic", quic_outbox::run),
-    ];
-    let mut threads = Vec::new();
-    for (name, body) in bodies {
-        let shared = shared.clone();
-        let thread = std::thread::Builder::new()
-            .name(name.to_owned())
-            .spawn(move || body(&shared))
-            .map_err(|error| system("start a thread of the network", &error))?;
-        threads.push(thread);
-    }
+    let threads = start_threads(&shared)?;
     tokio::spawn(accept::run(shared.clone(), endpoint.clone()));
     tokio::spawn(group::run(shared.clone()));
     let node_timeout_ns = u64::try_from(options.node_timeout.as_nanos()).unwrap_or(u64::MAX);
@@ -173,6 +161,24 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         threads: Mutex::new(threads),
         eviction,
     })
+}
+
+/// The threads of the hot plane, of the calling thread's class.
+fn start_threads(shared: &Arc<Shared>) -> Result<Vec<JoinHandle<()>>, LinkError> {
+    let bodies: [(_, ThreadBody); 2] = [
+        ("taut-udp", receive::run_udp),
+        ("taut-quic", quic_outbox::run),
+    ];
+    let mut threads = Vec::new();
+    for (name, body) in bodies {
+        let shared = shared.clone();
+        let thread = std::thread::Builder::new()
+            .name(name.to_owned())
+            .spawn(move || body(&shared))
+            .map_err(|error| system("start a thread of the network", &error))?;
+        threads.push(thread);
+    }
+    Ok(threads)
 }
 
 impl ServerLink {

@@ -18,8 +18,10 @@ use std::{
     time::Duration,
 };
 use taut_proto::{
-    Act, DecodeError, Header, Payload, header::MAX_DATAGRAM_BYTES, seal::OpenError,
-    time::TimeResponse,
+    Act, DecodeError, Header, Payload,
+    header::MAX_DATAGRAM_BYTES,
+    seal::OpenError,
+    time::{TimeRequest, TimeResponse},
 };
 
 /// Longest sleep of the receiving thread: how soon it notices that the server stops.
@@ -107,23 +109,20 @@ pub(crate) fn receive(
         }
         return;
     }
-    match opened.payload {
-        Payload::TimeRequest(request) => {
-            session.roll_keys(now_ns); // twenty times a second are often enough
-            session.send(
-                &Payload::TimeResponse(TimeResponse {
-                    client_sent: request.client_sent,
-                    server_received: now_ns,
-                    server_sent: shared.clock.now_ns(),
-                }),
-                shared,
-            );
-            // Who hears the group is told what was really sent to it.
-            if session.may_listen() && shared.group.is_wanted() {
-                let confirmation = shared.sent_states.lately(request.client_sent);
-                session.send(&Payload::Confirm(confirmation), shared);
-            }
-        }
+    take(shared, session, opened.payload, from, now_ns);
+}
+
+/// Does what a datagram asks for that `session` may send.
+fn take(
+    shared: &Shared,
+    session: &Arc<Session>,
+    payload: Payload,
+    from: Option<SocketAddr>,
+    now_ns: u64,
+) {
+    let counters = &shared.counters;
+    match payload {
+        Payload::TimeRequest(request) => tell_time(shared, session, request, now_ns),
         Payload::Arrive(arrive) => {
             if let Some(frames) = &shared.frames {
                 frames.arrive(session, &arrive, now_ns, shared);
@@ -182,6 +181,23 @@ pub(crate) fn receive(
         | Payload::PassedForce(_)
         | Payload::Confirm(_)
         | Payload::PathChallenge(_) => {}
+    }
+}
+
+fn tell_time(shared: &Shared, session: &Arc<Session>, request: TimeRequest, now_ns: u64) {
+    session.roll_keys(now_ns); // twenty times a second are often enough
+    session.send(
+        &Payload::TimeResponse(TimeResponse {
+            client_sent: request.client_sent,
+            server_received: now_ns,
+            server_sent: shared.clock.now_ns(),
+        }),
+        shared,
+    );
+    // Who hears the group is told what was really sent to it.
+    if session.may_listen() && shared.group.is_wanted() {
+        let confirmation = shared.sent_states.lately(request.client_sent);
+        session.send(&Payload::Confirm(confirmation), shared);
     }
 }
 
