@@ -31,6 +31,7 @@ mod record;
 mod recording_size;
 pub(crate) mod render;
 pub mod replay;
+mod sending;
 mod serve;
 mod setup;
 mod signals;

@@ -1,17 +1,15 @@
 //! `taut push-wrench`: gives a force from outside to a server whose workbench file takes one (`[wrench_in]` with source = "taut").
 
-use std::future::ready;
 use std::io::{BufRead, BufReader, Read};
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use taut_bridge::service_manager::{ServiceNotifier, Turns};
-use taut_link::{ClientLink, ClientOptions, LinkError, Renewal, Role, SessionEnd, SupervisedLink};
+use taut_link::{ClientLink, ClientOptions, Role};
 use taut_proto::ForceSample;
 
 use crate::cli::PushWrenchArgs;
 use crate::commands::key;
+use crate::commands::sending::{self, Sending, Sent, Source};
 use crate::commands::signals::EndSignal;
 use crate::shared::failure::Failure;
 
@@ -25,95 +23,26 @@ type Wrench = [f64; 6];
 /// Sends until the duration or the input is over, the user ends it, or the server stops; a server that is lost is joined again. How many values were sent.
 pub async fn run(args: &PushWrenchArgs) -> Result<u64, Failure> {
     let key = key::read_to_join(args.key.as_deref())?;
-    let mut signal = EndSignal::listen().map_err(Failure::failed)?;
-    let mut source = match args.wrench {
-        Some(wrench) => Source::Constant(wrench),
-        None => Source::Lines(lines_of(std::io::stdin())?),
+    let signal = EndSignal::listen().map_err(Failure::failed)?;
+    let source = match args.wrench {
+        Some(wrench) => Wrenches::Constant(wrench),
+        None => Wrenches::Lines(lines_of(std::io::stdin())?),
     };
     let options = ClientOptions {
         transport: args.transport.into(),
         ..ClientOptions::new(&args.server, key, Role::Force, &args.node)
     };
-    let alive = Turns::default();
-    let notifier = ServiceNotifier::start("the force source runs", [alive.clone()], || false);
-    let joining = SupervisedLink::join(options, args.membership.policy(), |_| {
-        ready(Ok::<(), LinkError>(()))
-    });
-    let (supervised, mut link, ()) = tokio::select! {
-        joined = alive.during(joining) => joined?,
-        () = signal.given() => return Ok(0),
+    let sending = Sending {
+        what: "the force source runs",
+        rate: args.rate,
+        duration: args.duration,
+        policy: args.membership.policy(),
     };
-    let (sent, end) = send(
-        &supervised,
-        &mut link,
-        &mut source,
-        args,
-        &mut signal,
-        &alive,
-    )
-    .await;
-    drop(notifier);
-    // Nobody is to join again for the session that is left here.
-    drop(supervised);
-    link.leave().await;
-    end.map(|()| sent)
-}
-
-/// How many values were sent, and what ended it.
-async fn send(
-    supervised: &SupervisedLink<()>,
-    link: &mut Arc<ClientLink>,
-    source: &mut Source,
-    args: &PushWrenchArgs,
-    signal: &mut EndSignal,
-    alive: &Turns,
-) -> (u64, Result<(), Failure>) {
-    let mut period = tokio::time::interval(Duration::from_secs_f64(args.rate.recip()));
-    period.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-    let start = Instant::now();
-    let mut index = 0;
-    loop {
-        tokio::select! {
-            () = signal.given() => return (index, Ok(())),
-            _ = period.tick() => {}
-        }
-        alive.count();
-        let since_start = start.elapsed().as_secs_f64();
-        if args.duration.is_some_and(|wanted| since_start >= wanted) {
-            return (index, Ok(()));
-        }
-        match supervised.take_renewal() {
-            None => {}
-            Some(Renewal::Session { link: next, .. }) => *link = next,
-            Some(Renewal::Ended(SessionEnd::Lost(reason))) => {
-                let text = format!("the server at {} was lost: {reason}", args.server);
-                return (index, Err(Failure::Failed(text)));
-            }
-            Some(Renewal::Ended(SessionEnd::ServerStopped)) => return (index, Ok(())),
-        }
-        // A value without a time is felt by nobody: the clock is locked a tenth of a second after joining.
-        let Some(now) = link.session_now() else {
-            continue;
-        };
-        match source.newest() {
-            Ok(None) => {}
-            Ok(Some(wrench)) => {
-                index += 1;
-                link.send_force(&ForceSample {
-                    sample_time_ns: now.ns,
-                    clock_uncertainty_ns: now.uncertainty_ns,
-                    index,
-                    wrench,
-                });
-            }
-            Err(Over::Input) => return (index, Ok(())),
-            Err(Over::Bad(text)) => return (index, Err(Failure::BadInput(text))),
-        }
-    }
+    sending::run(sending, options, signal, source).await
 }
 
 /// Where values come from.
-enum Source {
+enum Wrenches {
     /// The same one in every period.
     Constant(Wrench),
     /// Each line of the input once: who stops writing stops the force.
@@ -128,7 +57,30 @@ enum Over {
     Bad(String),
 }
 
-impl Source {
+impl Source for Wrenches {
+    fn send(&mut self, link: &ClientLink, index: u64, _since_start: Duration) -> Sent {
+        // A value without a time is felt by nobody: the clock is locked a tenth of a second after joining.
+        let Some(now) = link.session_now() else {
+            return Sent::Nothing;
+        };
+        match self.newest() {
+            Ok(None) => Sent::Nothing,
+            Ok(Some(wrench)) => {
+                link.send_force(&ForceSample {
+                    sample_time_ns: now.ns,
+                    clock_uncertainty_ns: now.uncertainty_ns,
+                    index,
+                    wrench,
+                });
+                Sent::One
+            }
+            Err(Over::Input) => Sent::Over(Ok(())),
+            Err(Over::Bad(text)) => Sent::Over(Err(Failure::BadInput(text))),
+        }
+    }
+}
+
+impl Wrenches {
     /// The newest value that has not been sent, if there is one.
     fn newest(&mut self) -> Result<Option<Wrench>, Over> {
         let lines = match self {

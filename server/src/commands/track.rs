@@ -1,18 +1,16 @@
 //! `taut track`: says where the viewer's head is to a server whose workbench file has `remote_tracker = true` in `[viewer]`.
 
-use std::future::ready;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use god_object::spatial::Pose;
-use taut_bridge::service_manager::{ServiceNotifier, Turns};
 use taut_bridge::{Trace, TrackerFeed, VrpnSettings, read_trace};
-use taut_link::{ClientLink, ClientOptions, LinkError, Renewal, Role, SessionEnd, SupervisedLink};
+use taut_link::{ClientLink, ClientOptions, Role};
 use taut_proto::{HeadSample, PoseF64};
 
 use crate::cli::TrackArgs;
 use crate::commands::arguments::HeadFrom;
 use crate::commands::key;
+use crate::commands::sending::{self, Sending, Sent, Source};
 use crate::commands::signals::EndSignal;
 use crate::shared::failure::Failure;
 
@@ -23,14 +21,14 @@ const LOOKS_PER_READING: f64 = 4.0;
 /// sent.
 pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
     let key = key::read_to_join(args.key.as_deref())?;
-    let mut signal = EndSignal::listen().map_err(Failure::failed)?;
-    let mut source = match &args.source {
-        HeadFrom::Still => Source::Still(None),
+    let signal = EndSignal::listen().map_err(Failure::failed)?;
+    let source = match &args.source {
+        HeadFrom::Still => Head::Still(None),
         HeadFrom::Trace(path) => {
             let trace = read_trace(path).map_err(Failure::bad_input)?;
-            Source::Trace(TracePlayer::new(trace)?)
+            Head::Trace(TracePlayer::new(trace)?)
         }
-        HeadFrom::Vrpn(settings) => Source::Tracker {
+        HeadFrom::Vrpn(settings) => Head::Tracker {
             feed: TrackerFeed::start(settings.source.clone()).map_err(|error| {
                 Failure::failed(format!("the head tracker cannot be listened to ({error})"))
             })?,
@@ -42,89 +40,21 @@ pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
         transport: args.transport.into(),
         ..ClientOptions::new(&args.server, key, Role::Tracker, &args.node)
     };
-    let alive = Turns::default();
-    let notifier = ServiceNotifier::start("the tracker runs", [alive.clone()], || false);
-    let joining = SupervisedLink::join(options, args.membership.policy(), |_| {
-        ready(Ok::<(), LinkError>(()))
-    });
-    let (supervised, mut link, ()) = tokio::select! {
-        joined = alive.during(joining) => joined?,
-        () = signal.given() => return Ok(0),
-    };
-    source.rest_as_in(&link);
-    let sending = send_readings(
-        &supervised,
-        &mut link,
-        &mut source,
-        args,
-        &mut signal,
-        &alive,
-    );
-    let (sent, end) = sending.await;
-    drop(notifier);
-    // Nobody is to join again for the session that is left here.
-    drop(supervised);
-    link.leave().await;
-    match end {
-        Some(SessionEnd::Lost(reason)) => Err(Failure::Failed(format!(
-            "the server at {} was lost: {reason}",
-            args.server
-        ))),
-        Some(SessionEnd::ServerStopped) | None => Ok(sent),
-    }
-}
-
-/// How many readings were sent, and what ended it if nobody here did.
-async fn send_readings(
-    supervised: &SupervisedLink<()>,
-    link: &mut Arc<ClientLink>,
-    source: &mut Source,
-    args: &TrackArgs,
-    signal: &mut EndSignal,
-    alive: &Turns,
-) -> (u64, Option<SessionEnd>) {
     let looks = match source {
-        Source::Tracker { .. } => args.rate * LOOKS_PER_READING,
-        Source::Still(_) | Source::Trace(_) => args.rate,
+        Head::Tracker { .. } => args.rate * LOOKS_PER_READING,
+        Head::Still(_) | Head::Trace(_) => args.rate,
     };
-    let mut period = tokio::time::interval(Duration::from_secs_f64(looks.recip()));
-    period.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-    let start = Instant::now();
-    let mut index = 0;
-    loop {
-        tokio::select! {
-            () = signal.given() => return (index, None),
-            _ = period.tick() => {}
-        }
-        alive.count();
-        let since_start = start.elapsed();
-        let is_over = args
-            .duration
-            .is_some_and(|wanted| since_start.as_secs_f64() >= wanted);
-        if is_over {
-            return (index, None);
-        }
-        match supervised.take_renewal() {
-            None => {}
-            Some(Renewal::Session { link: next, .. }) => {
-                source.rest_as_in(&next);
-                *link = next;
-            }
-            Some(Renewal::Ended(end)) => return (index, Some(end)),
-        }
-        if let Some(pose) = source.newest(since_start) {
-            index += 1;
-            link.send_head(&HeadSample {
-                sample_time_ns: link.session_now().map_or(0, |now| now.ns),
-                index,
-                pose: PoseF64::from_isometry(&pose),
-            });
-        }
-    }
+    let sending = Sending {
+        what: "the tracker runs",
+        rate: looks,
+        duration: args.duration,
+        policy: args.membership.policy(),
+    };
+    sending::run(sending, options, signal, source).await
 }
 
 /// A source at work.
-enum Source {
+enum Head {
     Still(Option<Pose>),
     Trace(TracePlayer),
     Tracker {
@@ -135,14 +65,28 @@ enum Source {
     },
 }
 
-impl Source {
+impl Source for Head {
     /// A head that stays is where this session's workbench has it.
-    fn rest_as_in(&mut self, link: &ClientLink) {
+    fn begin(&mut self, link: &ClientLink) {
         if let Self::Still(pose) = self {
             *pose = link.description().viewer.to_isometry();
         }
     }
 
+    fn send(&mut self, link: &ClientLink, index: u64, since_start: Duration) -> Sent {
+        let Some(pose) = self.newest(since_start) else {
+            return Sent::Nothing;
+        };
+        link.send_head(&HeadSample {
+            sample_time_ns: link.session_now().map_or(0, |now| now.ns),
+            index,
+            pose: PoseF64::from_isometry(&pose),
+        });
+        Sent::One
+    }
+}
+
+impl Head {
     /// The head, workbench frame, if there is anything new.
     fn newest(&mut self, since_start: Duration) -> Option<Pose> {
         match self {
@@ -205,9 +149,7 @@ mod tests {
             pose: Pose::translation(time_s, 0.0, 0.0),
             buttons: 0,
         };
-        let Ok(player) = TracePlayer::new(vec![row(1.0), row(1.5), row(2.0)]) else {
-            panic!("three rows");
-        };
+        let player = TracePlayer::new(vec![row(1.0), row(1.5), row(2.0)]).expect("three rows");
         for (since_s, x) in [(0.0, 1.0), (0.4, 1.0), (0.6, 1.5), (1.1, 1.0), (7.75, 1.5)] {
             let pose = player.pose(Duration::from_secs_f64(since_s));
             assert_eq!(pose.translation.x, x, "{since_s}");
