@@ -141,200 +141,238 @@ impl Collector for Exposition {
     fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> fmt::Result {
         let (metrics, session) = (&self.0, &self.0.session);
         let to = &mut encoder;
-        gauge(
-            to,
-            "session_duration",
-            "how long the loops have run",
-            Some(Unit::Seconds),
-            session.duration_s,
-        )?;
-        gauge(
-            to,
-            "haptics_rate",
-            "ticks of the haptics loop per second since the start",
-            Some(HERTZ()),
-            session.haptics_hz,
-        )?;
-        gauge(
-            to,
-            "god_object_rate",
-            "god-object updates per second since the start",
-            Some(HERTZ()),
-            session.god_object_hz,
-        )?;
-        for (name, help, of) in [
-            (
-                "haptics_period",
-                "time between two ticks of the haptics loop",
-                &session.haptics_period_us,
-            ),
-            (
-                "god_object_update",
-                "thread CPU time of a god-object update",
-                &session.god_object_update_us,
-            ),
-            (
-                "force_computation",
-                "thread CPU time of one force",
-                &session.force_us,
-            ),
-            (
-                "answer_wait",
-                "reading of a device sample to the start of its force",
-                &session.answer_wait_us,
-            ),
-            (
-                "force_latency",
-                "reading of a device sample to the rendering of its force",
-                &session.force_latency_us,
-            ),
-            (
-                "constraint_latency",
-                "device sample to the rendering of a force whose constraints answer it",
-                &session.constraint_latency_us,
-            ),
-            (
-                "constraint_age",
-                "age of the constraint set that a force rests on",
-                &session.constraint_age_us,
-            ),
-        ] {
-            quantiles(to, name, help, of)?;
-        }
-        gauge(
-            to,
-            "largest_force",
-            "largest norm of a force that the hand felt since the start",
-            Some(Unit::Other("newtons".to_owned())),
-            session.largest_force_n,
-        )?;
-        gauge(
-            to,
-            "energy_injected",
-            "energy given to the hand beyond what it had put in",
-            Some(Unit::Joules),
-            session.energy_injected_j,
-        )?;
-        gauge(
-            to,
-            "energy_generated",
-            "energy that the coupling made",
-            Some(Unit::Joules),
-            session.energy_generated_j,
-        )?;
-        for (name, help, count) in [
-            (
-                "deadline_misses",
-                "deadlines of the haptics loop without a tick in their period",
-                session.deadline_misses,
-            ),
-            (
-                "safety_events",
-                "times at which the safety stage or a device fault changed the force",
-                session.safety_events,
-            ),
-            (
-                "penetrations",
-                "published poses at which the bodies intersect",
-                session.penetrations,
-            ),
-            (
-                "penetration_checks",
-                "published poses that were checked",
-                session.penetration_checks,
-            ),
-            (
-                "solver_fallbacks",
-                "projections that the chosen solver did not certify",
-                session.solver_fallbacks,
-            ),
-            (
-                "log_lines_lost",
-                "log lines that nobody took",
-                metrics.log_lines_lost,
-            ),
-            (
-                "stream_observers_dropped",
-                "observers given up because they took nothing",
-                metrics.stream_observers_dropped,
-            ),
-        ] {
-            counter(to, name, help, count)?;
-        }
+        rates(to, session)?;
+        times(to, session)?;
+        felt(to, session)?;
+        counts(to, metrics)?;
         if let Some(external) = &session.external_wrench {
             external_wrench(to, external)?;
         }
-        for (name, count) in &metrics.network {
-            counter(
-                to,
-                &format!("network_{name}"),
-                "counted on the network since the start",
-                *count,
-            )?;
-        }
-        gauge(
-            to,
-            "clients",
-            "clients that are in",
-            None,
-            metrics.clients_present as f64,
-        )?;
-        gauge(
-            to,
-            "stream_observers",
-            "observers of the JSON lines",
-            None,
-            metrics.stream_observers as f64,
-        )?;
-        let links = |value: fn(&ClientLink) -> f64| {
-            metrics
-                .client_links
-                .iter()
-                .map(move |link| ([("node", link.node.clone())], value(link)))
-        };
-        labelled(
-            to,
-            "client_round_trip",
-            "round trip to a client",
-            Some(Unit::Seconds),
-            links(|link| 1e-3 * link.round_trip_ms),
-        )?;
-        labelled(
-            to,
-            "client_pose_age_p99",
-            "age of the state that a node drew, 99th percentile of its last second",
-            Some(Unit::Seconds),
-            links(|link| 1e-3 * link.pose_age_p99_ms),
-        )?;
-        labelled(
-            to,
-            "client_send_errors",
-            "datagrams that the system did not take for a client",
-            None,
-            links(|link| link.send_errors as f64),
-        )?;
-        labelled(
-            to,
-            "client_packets_lost",
-            "states that a client reports lost",
-            None,
-            links(|link| link.packets_lost as f64),
-        )?;
-        gauge(
-            to,
-            "process_memory",
-            "memory in RAM",
-            Some(Unit::Bytes),
-            metrics.memory_bytes as f64,
-        )?;
-        gauge(
-            to,
-            "process_open_files",
-            "open file descriptors",
-            None,
-            metrics.open_files as f64,
-        )
+        network(to, metrics)?;
+        clients(to, metrics)?;
+        this_process(to, metrics)
     }
+}
+
+/// How long and how fast the loops run.
+fn rates(to: &mut DescriptorEncoder<'_>, session: &SessionReport) -> fmt::Result {
+    gauge(
+        to,
+        "session_duration",
+        "how long the loops have run",
+        Some(Unit::Seconds),
+        session.duration_s,
+    )?;
+    gauge(
+        to,
+        "haptics_rate",
+        "ticks of the haptics loop per second since the start",
+        Some(HERTZ()),
+        session.haptics_hz,
+    )?;
+    gauge(
+        to,
+        "god_object_rate",
+        "god-object updates per second since the start",
+        Some(HERTZ()),
+        session.god_object_hz,
+    )
+}
+
+/// Periods, computing times and latencies of the loops.
+fn times(to: &mut DescriptorEncoder<'_>, session: &SessionReport) -> fmt::Result {
+    for (name, help, of) in [
+        (
+            "haptics_period",
+            "time between two ticks of the haptics loop",
+            &session.haptics_period_us,
+        ),
+        (
+            "god_object_update",
+            "thread CPU time of a god-object update",
+            &session.god_object_update_us,
+        ),
+        (
+            "force_computation",
+            "thread CPU time of one force",
+            &session.force_us,
+        ),
+        (
+            "answer_wait",
+            "reading of a device sample to the start of its force",
+            &session.answer_wait_us,
+        ),
+        (
+            "force_latency",
+            "reading of a device sample to the rendering of its force",
+            &session.force_latency_us,
+        ),
+        (
+            "constraint_latency",
+            "device sample to the rendering of a force whose constraints answer it",
+            &session.constraint_latency_us,
+        ),
+        (
+            "constraint_age",
+            "age of the constraint set that a force rests on",
+            &session.constraint_age_us,
+        ),
+    ] {
+        quantiles(to, name, help, of)?;
+    }
+    Ok(())
+}
+
+/// Force and energy at the hand.
+fn felt(to: &mut DescriptorEncoder<'_>, session: &SessionReport) -> fmt::Result {
+    gauge(
+        to,
+        "largest_force",
+        "largest norm of a force that the hand felt since the start",
+        Some(Unit::Other("newtons".to_owned())),
+        session.largest_force_n,
+    )?;
+    gauge(
+        to,
+        "energy_injected",
+        "energy given to the hand beyond what it had put in",
+        Some(Unit::Joules),
+        session.energy_injected_j,
+    )?;
+    gauge(
+        to,
+        "energy_generated",
+        "energy that the coupling made",
+        Some(Unit::Joules),
+        session.energy_generated_j,
+    )
+}
+
+/// What must stay rare.
+fn counts(to: &mut DescriptorEncoder<'_>, metrics: &Metrics) -> fmt::Result {
+    for (name, help, count) in [
+        (
+            "deadline_misses",
+            "deadlines of the haptics loop without a tick in their period",
+            metrics.session.deadline_misses,
+        ),
+        (
+            "safety_events",
+            "times at which the safety stage or a device fault changed the force",
+            metrics.session.safety_events,
+        ),
+        (
+            "penetrations",
+            "published poses at which the bodies intersect",
+            metrics.session.penetrations,
+        ),
+        (
+            "penetration_checks",
+            "published poses that were checked",
+            metrics.session.penetration_checks,
+        ),
+        (
+            "solver_fallbacks",
+            "projections that the chosen solver did not certify",
+            metrics.session.solver_fallbacks,
+        ),
+        (
+            "log_lines_lost",
+            "log lines that nobody took",
+            metrics.log_lines_lost,
+        ),
+        (
+            "stream_observers_dropped",
+            "observers given up because they took nothing",
+            metrics.stream_observers_dropped,
+        ),
+    ] {
+        counter(to, name, help, count)?;
+    }
+    Ok(())
+}
+
+/// The counters of the link.
+fn network(to: &mut DescriptorEncoder<'_>, metrics: &Metrics) -> fmt::Result {
+    for (name, count) in &metrics.network {
+        counter(
+            to,
+            &format!("network_{name}"),
+            "counted on the network since the start",
+            *count,
+        )?;
+    }
+    Ok(())
+}
+
+/// Who is in, and how its link fares.
+fn clients(to: &mut DescriptorEncoder<'_>, metrics: &Metrics) -> fmt::Result {
+    gauge(
+        to,
+        "clients",
+        "clients that are in",
+        None,
+        metrics.clients_present as f64,
+    )?;
+    gauge(
+        to,
+        "stream_observers",
+        "observers of the JSON lines",
+        None,
+        metrics.stream_observers as f64,
+    )?;
+    let links = |value: fn(&ClientLink) -> f64| {
+        metrics
+            .client_links
+            .iter()
+            .map(move |link| ([("node", link.node.clone())], value(link)))
+    };
+    labelled(
+        to,
+        "client_round_trip",
+        "round trip to a client",
+        Some(Unit::Seconds),
+        links(|link| 1e-3 * link.round_trip_ms),
+    )?;
+    labelled(
+        to,
+        "client_pose_age_p99",
+        "age of the state that a node drew, 99th percentile of its last second",
+        Some(Unit::Seconds),
+        links(|link| 1e-3 * link.pose_age_p99_ms),
+    )?;
+    labelled(
+        to,
+        "client_send_errors",
+        "datagrams that the system did not take for a client",
+        None,
+        links(|link| link.send_errors as f64),
+    )?;
+    labelled(
+        to,
+        "client_packets_lost",
+        "states that a client reports lost",
+        None,
+        links(|link| link.packets_lost as f64),
+    )
+}
+
+/// What the program takes of the machine.
+fn this_process(to: &mut DescriptorEncoder<'_>, metrics: &Metrics) -> fmt::Result {
+    gauge(
+        to,
+        "process_memory",
+        "memory in RAM",
+        Some(Unit::Bytes),
+        metrics.memory_bytes as f64,
+    )?;
+    gauge(
+        to,
+        "process_open_files",
+        "open file descriptors",
+        None,
+        metrics.open_files as f64,
+    )
 }
 
 /// A force from outside.

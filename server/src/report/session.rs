@@ -152,46 +152,8 @@ impl SessionReport {
 
 impl fmt::Display for SessionReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (period, update, force, age) = (
-            &self.haptics_period_us,
-            &self.god_object_update_us,
-            &self.force_us,
-            &self.constraint_age_us,
-        );
         writeln!(f, "{}", self.verdict())?;
-        writeln!(f, "ran for             {:.1} s", self.duration_s)?;
-        writeln!(
-            f,
-            "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, p99.9 {:.0} us, max {:.0} us, {} deadlines missed",
-            self.haptics_hz, period.p50, period.p99, period.p999, period.max, self.deadline_misses
-        )?;
-        writeln!(
-            f,
-            "god-object          {:.0} Hz, update p50 {:.0} us, p99 {:.0} us, max {:.0} us",
-            self.god_object_hz, update.p50, update.p99, update.max
-        )?;
-        writeln!(
-            f,
-            "force               p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us; constraints {:.0} us old at p99",
-            force.p50, force.p99, force.p999, force.max, age.p99
-        )?;
-        let (wait, latency) = (&self.answer_wait_us, &self.force_latency_us);
-        writeln!(
-            f,
-            "  after its sample  begun p50 {:.0} us, p99 {:.0} us; rendered p50 {:.0} us, p99 {:.0} us, p99.9 {:.0} us",
-            wait.p50, wait.p99, latency.p50, latency.p99, latency.p999
-        )?;
-        for (what, times) in [
-            ("pose and tensions", &self.tension_us),
-            ("  with coupling", &self.coupling_and_tension_us),
-        ] {
-            let Some(times) = times else { continue };
-            writeln!(
-                f,
-                "{what:<19} p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us",
-                times.p50, times.p99, times.p999, times.max
-            )?;
-        }
+        self.write_loops(f)?;
         writeln!(
             f,
             "contacts            p50 {:.0}, max {:.0}",
@@ -232,36 +194,85 @@ impl fmt::Display for SessionReport {
             "datagrams           {} sent, {} refused",
             self.packets_sent, self.packets_refused
         )?;
-        for client in &self.clients {
-            if client.frames == 0 {
-                // A node may be gone before its first frame.
-                let what = if client.draws {
-                    "drew nothing"
-                } else {
-                    "bridge"
-                };
-                write!(
-                    f,
-                    "\n{:<19} {what}, {} lost, by {}",
-                    client.node, client.packets_lost, client.transport
-                )?;
-                continue;
-            }
-            write!(
+        self.clients
+            .iter()
+            .try_for_each(|client| write_client(f, client))
+    }
+}
+
+impl SessionReport {
+    /// Rates and times of the loops.
+    fn write_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (period, update, force, age) = (
+            &self.haptics_period_us,
+            &self.god_object_update_us,
+            &self.force_us,
+            &self.constraint_age_us,
+        );
+        writeln!(f, "ran for             {:.1} s", self.duration_s)?;
+        writeln!(
+            f,
+            "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, p99.9 {:.0} us, max {:.0} us, {} deadlines missed",
+            self.haptics_hz, period.p50, period.p99, period.p999, period.max, self.deadline_misses
+        )?;
+        writeln!(
+            f,
+            "god-object          {:.0} Hz, update p50 {:.0} us, p99 {:.0} us, max {:.0} us",
+            self.god_object_hz, update.p50, update.p99, update.max
+        )?;
+        writeln!(
+            f,
+            "force               p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us; constraints {:.0} us old at p99",
+            force.p50, force.p99, force.p999, force.max, age.p99
+        )?;
+        let (wait, latency) = (&self.answer_wait_us, &self.force_latency_us);
+        writeln!(
+            f,
+            "  after its sample  begun p50 {:.0} us, p99 {:.0} us; rendered p50 {:.0} us, p99 {:.0} us, p99.9 {:.0} us",
+            wait.p50, wait.p99, latency.p50, latency.p99, latency.p999
+        )?;
+        for (what, times) in [
+            ("pose and tensions", &self.tension_us),
+            ("  with coupling", &self.coupling_and_tension_us),
+        ] {
+            let Some(times) = times else { continue };
+            writeln!(
                 f,
-                "\n{:<19} {} frames, {:.0} fps, poses {:.1} ms old when taken, {:.1} ms when drawn (p99 {:.1} ms), {} lost, by {}",
-                client.node,
-                client.frames,
-                client.fps,
-                client.pose_age_ms.p50,
-                client.drawn_age_ms.p50,
-                client.drawn_age_ms.p99,
-                client.packets_lost,
-                client.transport
+                "{what:<19} p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us",
+                times.p50, times.p99, times.p999, times.max
             )?;
         }
         Ok(())
     }
+}
+
+/// What a client drew, or that it drew nothing, in a line of its own.
+fn write_client(f: &mut fmt::Formatter<'_>, client: &ClientReport) -> fmt::Result {
+    if client.frames == 0 {
+        // A node may be gone before its first frame.
+        let what = if client.draws {
+            "drew nothing"
+        } else {
+            "bridge"
+        };
+        return write!(
+            f,
+            "\n{:<19} {what}, {} lost, by {}",
+            client.node, client.packets_lost, client.transport
+        );
+    }
+    write!(
+        f,
+        "\n{:<19} {} frames, {:.0} fps, poses {:.1} ms old when taken, {:.1} ms when drawn (p99 {:.1} ms), {} lost, by {}",
+        client.node,
+        client.frames,
+        client.fps,
+        client.pose_age_ms.p50,
+        client.drawn_age_ms.p50,
+        client.drawn_age_ms.p99,
+        client.packets_lost,
+        client.transport
+    )
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use taut_bridge::realtime::{keep_cores_awake, lock_memory};
 use taut_bridge::{ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{ServerLink, ServerOptions, proto};
-use taut_recording::Recorder;
+use taut_recording::{Recorder, Taps};
 use tokio::runtime::Runtime;
 
 use crate::loops::checker::PenetrationChecker;
@@ -24,7 +24,9 @@ use crate::session::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Sever
 use crate::session::observers::ObserverServices;
 use crate::session::operator::{Continuity, Facts, OperatorPage};
 use crate::session::setup::content::own_colours;
-use crate::session::setup::{DeviceSource, SessionSetup, untravelled};
+use crate::session::setup::{
+    DeviceSource, LinkSettings, RecordingSettings, SessionSetup, untravelled,
+};
 use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
 use crate::shared::passed_wrench::{self, PassedReader};
@@ -66,36 +68,8 @@ impl Session {
         let opening = opening(&setup);
         let facts = setup.operator.as_ref().map(|page| Facts::of(&setup, page));
         let scene_revision = setup.content.description.revision;
-        let coupling = match &setup.device {
-            DeviceSource::Remote { .. } => offer_of(
-                &setup.world,
-                &setup.settings,
-                setup.realtime.broadcast_period.as_secs_f64().recip(),
-            )
-            .map_err(untravelled)?,
-            DeviceSource::Local(_) => CouplingOffer::AtServer {
-                reason: "its workbench has a device of its own".into(),
-            },
-        };
-        let options = ServerOptions {
-            coupling,
-            quic: setup.link.quic,
-            udp: setup.link.udp,
-            announced_udp_port: setup.link.announced_udp_port,
-            multicast: setup.link.multicast,
-            also: setup.link.also,
-            max_clients: setup.link.max_clients,
-            frames: setup.link.frames,
-            policy: setup.link.policy.clone(),
-            node_timeout: setup.link.node_timeout,
-            clock: clock.for_link(),
-            ..ServerOptions::new(setup.link.key)
-        };
-        // QUIC must not give up a node on a network whose pauses the workbench bears, nor before the eviction that says why.
-        let options = ServerOptions {
-            idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
-            ..options
-        };
+        let policy = setup.link.policy.clone();
+        let options = server_options(coupling_offer(&setup)?, setup.link, clock);
         let (observers, mut outlets) =
             ObserverServices::start(&setup.observers, &setup.content.description, clock)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
@@ -113,16 +87,7 @@ impl Session {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
 
-        let (taps, recorder) = match &setup.recording {
-            Some(wanted) => {
-                let (taps, recorder) =
-                    Recorder::start(&wanted.directory, wanted.manifest.clone(), &wanted.scene)
-                        .map_err(Failure::bad_input)?;
-                (Some(taps), Some(recorder))
-            }
-            None => (None, None),
-        };
-
+        let (taps, recorder) = setup.recording.as_ref().map(record).transpose()?.unzip();
         let fidelity = setup.fidelity.map(|plan| Fidelity {
             watch: Arc::new(FidelityWatch::new(&plan)),
             plan,
@@ -149,18 +114,15 @@ impl Session {
             switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
         });
         let operator = match (&setup.operator, facts) {
-            (Some(wanted), Some(facts)) => {
-                let page = OperatorPage::start(
-                    wanted,
-                    facts,
-                    outlets.add(),
-                    kept,
-                    &loops.statistics,
-                    clock,
-                    &setup.link.policy,
-                );
-                Some(page?)
-            }
+            (Some(wanted), Some(facts)) => Some(OperatorPage::start(
+                wanted,
+                facts,
+                outlets.add(),
+                kept,
+                &loops.statistics,
+                clock,
+                &policy,
+            )?),
             _ => {
                 kept.close();
                 None
@@ -204,13 +166,8 @@ impl Session {
                 statistics: loops.statistics.clone(),
                 clock,
             };
-            let feed = MonitorFeed::start(
-                settings,
-                &picture,
-                sources,
-                session.network.clone(),
-                &session.shutdown,
-            )?;
+            let network = session.network.clone();
+            let feed = MonitorFeed::start(settings, &picture, sources, network, &session.shutdown)?;
             session.monitor = Some(feed);
         }
         if setup.realtime.lock_memory {
@@ -284,6 +241,50 @@ fn network_runtime(ledger: &RealtimeLedger) -> Result<Runtime, Failure> {
         .map_err(|error| {
             Failure::failed(format!("the network's threads cannot be started ({error})"))
         })
+}
+
+/// What a bridge is offered: to couple by itself, where the device is behind one.
+fn coupling_offer(setup: &SessionSetup) -> Result<CouplingOffer, Failure> {
+    match &setup.device {
+        DeviceSource::Remote { .. } => {
+            let sets_hz = setup.realtime.broadcast_period.as_secs_f64().recip();
+            offer_of(&setup.world, &setup.settings, sets_hz).map_err(untravelled)
+        }
+        DeviceSource::Local(_) => Ok(CouplingOffer::AtServer {
+            reason: "its workbench has a device of its own".into(),
+        }),
+    }
+}
+
+fn server_options(
+    coupling: CouplingOffer,
+    link: LinkSettings,
+    clock: SessionClock,
+) -> ServerOptions {
+    let options = ServerOptions {
+        coupling,
+        quic: link.quic,
+        udp: link.udp,
+        announced_udp_port: link.announced_udp_port,
+        multicast: link.multicast,
+        also: link.also,
+        max_clients: link.max_clients,
+        frames: link.frames,
+        policy: link.policy,
+        node_timeout: link.node_timeout,
+        clock: clock.for_link(),
+        ..ServerOptions::new(link.key)
+    };
+    // QUIC must not give up a node on a network whose pauses the workbench bears, nor before the eviction that says why.
+    ServerOptions {
+        idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
+        ..options
+    }
+}
+
+fn record(wanted: &RecordingSettings) -> Result<(Taps, Recorder), Failure> {
+    Recorder::start(&wanted.directory, wanted.manifest.clone(), &wanted.scene)
+        .map_err(Failure::bad_input)
 }
 
 /// The device, and the commands that go to its bridge if it is behind the network.

@@ -64,26 +64,7 @@ pub(super) fn run(
     } else {
         None
     };
-    if hold {
-        // A picture that sways under the mouse is no help.
-        workbench.viewer.tracking = HeadTracking::Fixed;
-    }
-    if args.bridge || hold {
-        workbench.device = Device::Remote;
-    } else if let DeviceChoice::Trace(path) = &choice {
-        workbench.device = Device::Trace {
-            path: path.clone(),
-            repeat: true,
-        };
-    } else if let (
-        DeviceChoice::Simulated {
-            strings: Some(named),
-        },
-        Device::Simulated { strings, .. },
-    ) = (&choice, &mut workbench.device)
-    {
-        *strings = Some(named.clone());
-    }
+    use_device(&mut workbench, &choice, args.bridge);
     let overrides = Overrides {
         scene: Some(scene),
         allow_unstable: args.allow_unstable,
@@ -123,37 +104,14 @@ pub(super) fn run(
         terminal.say(HELP_ARM);
     }
 
-    let mut children = Vec::new();
     let launcher = Launcher::new(&session, &directory, args)?;
+    let mut children = Vec::new();
     if args.bridge {
         children.push(launcher.bridge(device, hand_path.as_ref(), terminal)?);
     }
-    if render::BUILT_IN {
-        for (place, node) in workbench.nodes.iter().enumerate() {
-            // One window holds the body; the others look on.
-            let hold = hold && place == 0;
-            children.push(launcher.render_node(&node.name, hold, terminal)?);
-        }
-        if hold {
-            terminal.say(HELP_MOUSE);
-        }
-    } else {
-        terminal.say("this program was built without drawing; the demo goes on without it");
-    }
+    start_render_nodes(&launcher, &workbench, hold, terminal, &mut children)?;
 
-    let mut early = Vec::new();
-    watch(&mut session, args.duration, terminal, |_| {
-        for child in &mut children {
-            if let Some(status) = child.newly_ended()
-                && !status.success()
-            {
-                let what = format!("{} ended early ({status})", child.name());
-                terminal.say(&format!("taut: {what}; the demo goes on without it"));
-                early.push(what);
-            }
-        }
-        true
-    });
+    let early = watch_all(&mut session, &mut children, args.duration, terminal);
     terminal.end_status();
     // One that is still joining would complain.
     children.iter().for_each(NamedChild::mute);
@@ -168,6 +126,75 @@ pub(super) fn run(
         ));
     }
     Ok(ended)
+}
+
+/// Lets the chosen device move the god-object; the mouse and a bridge are remote ones.
+fn use_device(workbench: &mut Workbench, choice: &DeviceChoice, by_bridge: bool) {
+    let by_mouse = *choice == DeviceChoice::Mouse;
+    if by_mouse {
+        // A picture that sways under the mouse is no help.
+        workbench.viewer.tracking = HeadTracking::Fixed;
+    }
+    if by_bridge || by_mouse {
+        workbench.device = Device::Remote;
+    } else if let DeviceChoice::Trace(path) = choice {
+        workbench.device = Device::Trace {
+            path: path.clone(),
+            repeat: true,
+        };
+    } else if let (
+        DeviceChoice::Simulated {
+            strings: Some(named),
+        },
+        Device::Simulated { strings, .. },
+    ) = (choice, &mut workbench.device)
+    {
+        *strings = Some(named.clone());
+    }
+}
+
+/// Starts a process for every render node; one window holds the body, if any, and the others look on.
+fn start_render_nodes(
+    launcher: &Launcher<'_>,
+    workbench: &Workbench,
+    hold: bool,
+    terminal: &Terminal,
+    children: &mut Vec<NamedChild>,
+) -> Result<(), Failure> {
+    if !render::BUILT_IN {
+        terminal.say("this program was built without drawing; the demo goes on without it");
+        return Ok(());
+    }
+    for (place, node) in workbench.nodes.iter().enumerate() {
+        children.push(launcher.render_node(&node.name, hold && place == 0, terminal)?);
+    }
+    if hold {
+        terminal.say(HELP_MOUSE);
+    }
+    Ok(())
+}
+
+/// Runs until the session is over. Says which children ended with a failure before that.
+fn watch_all(
+    session: &mut Session,
+    children: &mut [NamedChild],
+    duration: Option<f64>,
+    terminal: &Terminal,
+) -> Vec<String> {
+    let mut early = Vec::new();
+    watch(session, duration, terminal, |_| {
+        for child in &mut *children {
+            if let Some(status) = child.newly_ended()
+                && !status.success()
+            {
+                let what = format!("{} ended early ({status})", child.name());
+                terminal.say(&format!("taut: {what}; the demo goes on without it"));
+                early.push(what);
+            }
+        }
+        true
+    });
+    early
 }
 
 /// Puts the demo on four ports from `first` on, or on free ones where that is 0.
