@@ -16,6 +16,7 @@ use crate::hand::Hand;
 use crate::membership::MembershipArgs;
 use crate::renderer::{Gpu, GpuChoice, SMOOTH};
 use crate::session::Session;
+use crate::stage::Stage;
 use crate::statistics::{Ended, NO_WINDOW, RenderReport, Statistics};
 use crate::timeline::Timeline;
 use crate::{headless, window};
@@ -157,19 +158,7 @@ pub enum ShowArg {
 /// Blocks, and in windows wants the main thread; must not be called from within an async runtime,
 /// because it owns one.
 pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
-    let delay_ns = (1e6 * within("--delay-ms", args.delay_ms, 0.0, MAX_DELAY_MS)?) as u64;
-    let fps = args
-        .fps
-        .map(|fps| within("--fps", fps, 0.01, 1000.0))
-        .transpose()?;
-    let longest = 1e9;
-    let duration = args
-        .duration
-        .map(|s| within("--duration", s, 0.0, longest))
-        .transpose()?;
-    let duration = duration.map(Duration::from_secs_f64);
-
-    let display_ns = (1e6 * within("--display-ms", args.display_ms, 0.0, MAX_DELAY_MS)?) as u64;
+    let limits = Limits::of(&args)?;
     let choice = args
         .gpu
         .as_ref()
@@ -182,20 +171,94 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     } else {
         None
     };
-    let default_fps = match &gpu {
-        None => WINDOW_FPS,
-        Some(gpu) if gpu.is_software() && args.out.is_some() => WRITTEN_FPS,
-        Some(_) => HEADLESS_FPS,
+    let options = client_options(&args)?;
+    let Some((mut session, stage, show)) = Session::join(options, policy, overrides(&args))? else {
+        return Ok(RenderReport::of_nothing(&args));
     };
-    let fps = fps.unwrap_or(default_fps);
-    let frame_time = Duration::from_secs_f64(1.0 / fps);
+
+    // Nodes show a frame together: one whose processors sleep deeply between two frames wakes up later than the others.
+    let (grant, _awake) = keep_cores_awake();
+    tracing::debug!("{grant}");
+    let mut timeline = Timeline::new(limits.delay_ns);
+    let mut statistics = Statistics::new();
+    let ended = if let Some(gpu) = gpu {
+        let drawn_with = DrawnWith {
+            adapter: gpu.summary().to_string(),
+            present_timing: NO_WINDOW.to_owned(),
+        };
+        let plan = headless_plan(&args, &limits, &gpu, show);
+        let mut canvas = Canvas::new(gpu, stage);
+        headless::run(
+            &mut session,
+            &mut canvas,
+            &mut timeline,
+            &mut statistics,
+            &plan,
+        )
+        .map(|ended| (ended, drawn_with))
+    } else {
+        let hand = match hand(&args, &stage) {
+            Ok(hand) => hand,
+            Err(error) => {
+                session.leave();
+                return Err(error);
+            }
+        };
+        let plan = window_plan(&args, &limits, &session, choice, show);
+        window::run(
+            &mut session,
+            stage,
+            &mut timeline,
+            &mut statistics,
+            plan,
+            hand,
+        )
+    };
+    finish(&args, session, &mut statistics, ended)
+}
+
+/// What the command line says of time, within its ranges.
+struct Limits {
+    delay_ns: u64,
+    display_ns: u64,
+    /// Frames per second, if they are given.
+    fps: Option<f64>,
+    duration: Option<Duration>,
+}
+
+impl Limits {
+    fn of(args: &RenderArgs) -> Result<Self, RenderError> {
+        let longest = 1e9;
+        let within_if_given = |option, value: Option<f64>, least, most| match value {
+            Some(value) => within(option, value, least, most).map(Some),
+            None => Ok(None),
+        };
+        Ok(Self {
+            delay_ns: (1e6 * within("--delay-ms", args.delay_ms, 0.0, MAX_DELAY_MS)?) as u64,
+            fps: within_if_given("--fps", args.fps, 0.01, 1000.0)?,
+            duration: within_if_given("--duration", args.duration, 0.0, longest)?
+                .map(Duration::from_secs_f64),
+            display_ns: (1e6 * within("--display-ms", args.display_ms, 0.0, MAX_DELAY_MS)?) as u64,
+        })
+    }
+
+    fn frame_time(&self, default_fps: f64) -> Duration {
+        Duration::from_secs_f64(1.0 / self.fps.unwrap_or(default_fps))
+    }
+}
+
+fn client_options(args: &RenderArgs) -> Result<ClientOptions, RenderError> {
     let key = read_join_key(&args.key)?;
     let mut options =
         ClientOptions::new(args.server.as_str(), key, Role::Render, args.node.as_str());
     options.transport = args.transport.into();
     options.mesh_cache = args.membership.cache()?;
     options.priority = Some(FRAME_PRIORITY); // drawing itself stays in the class of everybody
-    let overrides = Overrides {
+    Ok(options)
+}
+
+fn overrides(args: &RenderArgs) -> Overrides {
+    Overrides {
         width: args.width,
         height: args.height,
         stereo: args.stereo,
@@ -207,85 +270,74 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
             let beside = args.key.parent();
             beside.map(PathBuf::from).unwrap_or_default()
         }),
-    };
-    let Some((mut session, stage, show)) = Session::join(options, policy, overrides)? else {
-        return Ok(RenderReport::of_nothing(&args));
-    };
+    }
+}
 
-    // Nodes show a frame together: one whose processors sleep deeply between two frames wakes up later than the others.
-    let (grant, _awake) = keep_cores_awake();
-    tracing::debug!("{grant}");
-    let mut timeline = Timeline::new(delay_ns);
-    let mut statistics = Statistics::new();
-    let ended = if let Some(gpu) = gpu {
-        let drawn_with = DrawnWith {
-            adapter: gpu.summary().to_string(),
-            present_timing: NO_WINDOW.to_owned(),
-        };
-        let mut canvas = Canvas::new(gpu, stage);
-        let plan = headless::Plan {
-            frames: args.frames,
-            duration,
-            frame_time,
-            out: args.out.clone().map(|folder| (folder, args.node.clone())),
-            display_ns,
-            show,
-            node: args.node.clone(),
-        };
-        headless::run(
-            &mut session,
-            &mut canvas,
-            &mut timeline,
-            &mut statistics,
-            &plan,
-        )
-        .map(|ended| (ended, drawn_with))
-    } else {
-        let plan = window::Plan {
-            frames: args.frames,
-            duration,
-            frame_time,
-            software_frame_time: match args.fps {
-                Some(_) => frame_time,
-                None => Duration::from_secs_f64(1.0 / SOFTWARE_FPS),
-            },
-            fullscreen: args.fullscreen || session.fullscreen(),
-            monitors: if args.monitor.is_empty() {
-                session.monitors()
-            } else {
-                args.monitor.clone()
-            },
-            gpu: choice,
-            samples: args.samples,
-            display_ns,
-            show,
-            node: args.node.clone(),
-        };
-        let warped = stage.screens.iter().find(|screen| screen.is_warped());
-        if let (true, Some(screen)) = (args.hold, warped) {
-            session.leave();
-            return Err(RenderError::Option {
-                option: "--hold",
-                rule: "left out where a screen is warped, since the mouse would point beside it"
-                    .to_owned(),
-                value: format!("given with the screen \"{}\"", screen.name),
-            });
-        }
-        let hand = if args.hold {
-            Some(Hand::join(&args, &stage)?)
+fn headless_plan(args: &RenderArgs, limits: &Limits, gpu: &Gpu, show: Show) -> headless::Plan {
+    let default_fps = match gpu.is_software() && args.out.is_some() {
+        true => WRITTEN_FPS,
+        false => HEADLESS_FPS,
+    };
+    headless::Plan {
+        frames: args.frames,
+        duration: limits.duration,
+        frame_time: limits.frame_time(default_fps),
+        out: args.out.clone().map(|folder| (folder, args.node.clone())),
+        display_ns: limits.display_ns,
+        show,
+        node: args.node.clone(),
+    }
+}
+
+fn window_plan(
+    args: &RenderArgs,
+    limits: &Limits,
+    session: &Session,
+    gpu: GpuChoice,
+    show: Show,
+) -> window::Plan {
+    window::Plan {
+        frames: args.frames,
+        duration: limits.duration,
+        frame_time: limits.frame_time(WINDOW_FPS),
+        software_frame_time: limits.frame_time(SOFTWARE_FPS),
+        fullscreen: args.fullscreen || session.fullscreen(),
+        monitors: if args.monitor.is_empty() {
+            session.monitors()
         } else {
-            None
-        };
-        window::run(
-            &mut session,
-            stage,
-            &mut timeline,
-            &mut statistics,
-            plan,
-            hand,
-        )
-    };
+            args.monitor.clone()
+        },
+        gpu,
+        samples: args.samples,
+        display_ns: limits.display_ns,
+        show,
+        node: args.node.clone(),
+    }
+}
 
+/// The hand that the mouse holds the body with, where `--hold` asks for it.
+fn hand(args: &RenderArgs, stage: &Stage) -> Result<Option<Hand>, RenderError> {
+    if !args.hold {
+        return Ok(None);
+    }
+    if let Some(screen) = stage.screens.iter().find(|screen| screen.is_warped()) {
+        return Err(RenderError::Option {
+            option: "--hold",
+            rule: "left out where a screen is warped, since the mouse would point beside it"
+                .to_owned(),
+            value: format!("given with the screen \"{}\"", screen.name),
+        });
+    }
+    Hand::join(args, stage).map(Some)
+}
+
+/// Tells the server what was measured, leaves it, and says it to the user.
+fn finish(
+    args: &RenderArgs,
+    session: Session,
+    statistics: &mut Statistics,
+    ended: Result<(Ended, DrawnWith), RenderError>,
+) -> Result<RenderReport, RenderError> {
     if let Some(stats) = statistics.report(true) {
         session.report(stats);
     }
@@ -296,7 +348,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     let (ended, drawn_with) = ended?;
     let (pose_age_ms, drawn_age_ms) = statistics.ages();
     Ok(RenderReport {
-        node: args.node,
+        node: args.node.clone(),
         transport: args.transport.name().to_owned(),
         adapter: drawn_with.adapter,
         present_timing: drawn_with.present_timing,
