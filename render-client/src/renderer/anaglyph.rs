@@ -1,6 +1,6 @@
 //! Lays the two eyes' pictures over each other for red and cyan glasses.
 
-use super::pipeline::shader;
+use super::pipeline::{output_pass, to_output};
 
 /// The pipeline that combines two pictures into one of `format`.
 #[derive(Debug)]
@@ -10,29 +10,8 @@ pub(crate) struct Anaglyph {
 
 impl Anaglyph {
     pub(crate) fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
-        let source = include_str!("../../shaders/anaglyph.wgsl").to_owned();
-        let module = shader(device, "anaglyph", source);
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("anaglyph"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vertex"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(format.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+        let source = include_str!("../../shaders/anaglyph.wgsl");
+        let pipeline = to_output(device, format, "anaglyph", source, &[]);
         Self { pipeline }
     }
 
@@ -61,19 +40,7 @@ impl Anaglyph {
         eyes: &wgpu::BindGroup,
         target: &wgpu::TextureView,
     ) {
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("anaglyph"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            ..Default::default()
-        });
+        let mut pass = output_pass(encoder, "anaglyph", target);
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, eyes, &[]);
         pass.draw(0..3, 0..1);

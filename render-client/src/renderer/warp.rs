@@ -7,7 +7,7 @@ use wgpu::util::DeviceExt;
 
 use super::gpu::Gpu;
 use super::picture::PictureTarget;
-use super::pipeline::{filled, shader};
+use super::pipeline::{filled, output_pass, to_output};
 use crate::calibration::Chart;
 use crate::correction::{Correction, Hull, clip_from_target};
 use crate::view::{ClipPlanes, Eye, Eyes, Screen};
@@ -68,36 +68,13 @@ impl WarpPipeline {
     pub(crate) fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
         const ATTRIBUTES: [wgpu::VertexAttribute; 3] =
             wgpu::vertex_attr_array![0 => Float32x2, 1 => Float32x3, 2 => Float32];
-        let module = shader(
-            device,
-            "warp",
-            include_str!("../../shaders/warp.wgsl").into(),
-        );
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("warp"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vertex"),
-                compilation_options: Default::default(),
-                buffers: &[Some(wgpu::VertexBufferLayout {
-                    array_stride: size_of::<OutputNode>() as u64,
-                    step_mode: wgpu::VertexStepMode::Vertex,
-                    attributes: &ATTRIBUTES,
-                })],
-            },
-            primitive: Default::default(), // both sides: a mesh may be mirrored
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(format.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+        let nodes = wgpu::VertexBufferLayout {
+            array_stride: size_of::<OutputNode>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &ATTRIBUTES,
+        };
+        let source = include_str!("../../shaders/warp.wgsl");
+        let pipeline = to_output(device, format, "warp", source, &[Some(nodes)]);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("warp"),
             mag_filter: wgpu::FilterMode::Linear,
@@ -115,19 +92,7 @@ impl WarpPipeline {
         scenes: impl IntoIterator<Item = (&'s SceneTexture, [u32; 4])>,
         target: &wgpu::TextureView,
     ) {
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("warp"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            ..Default::default()
-        });
+        let mut pass = output_pass(encoder, "warp", target);
         pass.set_pipeline(&self.pipeline);
         pass.set_vertex_buffer(0, warp.vertices.slice(..));
         pass.set_index_buffer(warp.indices.slice(..), wgpu::IndexFormat::Uint32);
