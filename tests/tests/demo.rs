@@ -1,4 +1,4 @@
-//! `taut demo` as a newcomer runs it: everything up, a report with every key, and nothing left behind.
+//! `taut demo` as a newcomer runs it: everything up, a report, and nothing left behind.
 
 use std::time::Duration;
 
@@ -13,50 +13,8 @@ const DURATIONS_S: [u64; 3] = [12, 40, 120];
 const ENOUGH_FRAMES: u64 = 10;
 /// Only a node that waits for something has poses that are older, ms.
 const OLDEST_POSE_MS: f64 = 2000.0;
-/// The keys of the report that scripts rely on.
-const KEYS: [&str; 21] = [
-    "duration_s",
-    "haptics_hz",
-    "haptics_period_us",
-    "deadline_misses",
-    "god_object_update_us",
-    "force_us",
-    "coupling_and_tension_us",
-    "answer_wait_us",
-    "force_latency_us",
-    "constraint_latency_us",
-    "constraint_age_us",
-    "contacts",
-    "penetrations",
-    "penetration_checks",
-    "realtime",
-    "packets_sent",
-    "safety_events",
-    "energy_injected_j",
-    "frames",
-    "clients",
-    "observers",
-];
-const CLIENT_KEYS: [&str; 10] = [
-    "node",
-    "transport",
-    "frames",
-    "fps",
-    "pose_age_ms",
-    "drawn_age_ms",
-    "swap_skew_us",
-    "light_skew_us",
-    "packets_lost",
-    "state_hash_mismatches",
-];
 /// Share by which the periods of the haptics loop, those that it was late for and skipped included, may be off its rate.
 const RATE_TOLERANCE: f64 = 0.02;
-
-fn has_keys(object: &Value, keys: &[&str]) {
-    for key in keys {
-        assert!(object.get(key).is_some(), "{key} is missing in {object}");
-    }
-}
 
 #[test]
 fn the_demo_brings_everything_up_and_reports_it() {
@@ -86,12 +44,6 @@ fn run(workbench: &TestWorkbench, adapter: &Result<(), String>, duration_s: u64)
     let ended = demo.end(START_LIMIT + Duration::from_secs(duration_s) + END_LIMIT);
     assert!(ended.status.success(), "{}", ended.status);
     let report = ended.json();
-    has_keys(&report, &KEYS);
-    has_keys(
-        &report["haptics_period_us"],
-        &["p50", "p99", "p999", "max", "count"],
-    );
-    has_keys(&report["realtime"], &["enforced", "waived"]);
 
     let hz = report["haptics_hz"].as_f64().expect("a number");
     println!(
@@ -136,7 +88,6 @@ fn run(workbench: &TestWorkbench, adapter: &Result<(), String>, duration_s: u64)
     let nodes: Vec<&Value> = clients.iter().map(|client| &client["node"]).collect();
     assert_eq!(nodes.len(), 2, "{nodes:?}");
     for client in clients {
-        has_keys(client, &CLIENT_KEYS);
         println!("{client}");
         assert_eq!(client["state_hash_mismatches"], 0);
         assert_eq!(client["transport"], "udp");
@@ -179,7 +130,7 @@ fn ctrl_c_ends_the_demo_and_its_children() {
     // `end` also fails when a child outlives the demo.
     let ended = demo.end(END_LIMIT);
     assert!(ended.status.success(), "{}", ended.status);
-    has_keys(&ended.json(), &KEYS);
+    assert!(ended.json()["haptics_hz"].is_number());
 }
 
 #[test]
