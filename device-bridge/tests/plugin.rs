@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use libloading::Library;
 use nalgebra::{UnitQuaternion, Vector3};
-use taut_bridge::Rearm;
+use taut_bridge::{Device, Rearm};
 
 use crate::support::stage::{
     GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, PATIENCE,
@@ -227,44 +227,23 @@ fn documented(name: &str) -> (tempfile::TempDir, String) {
     (folder, format!("plugin:{}", plugin.display()))
 }
 
-#[test]
-fn openhaptics_functions_are_called_as_published() {
-    let (folder, bare) = documented("hd");
-    let vendor = stand_in(folder.path(), "stand_in_hd.c", "HD");
-    let inside = Loaded::of(&vendor);
-    for (options, named) in [
-        (
-            "library=/no/libHD.so",
-            "cannot be loaded (install it; option library=PATH)",
-        ),
-        ("force=1e9", "out of range: force"),
-        ("colour=red", "there are library, name, force, stiffness"),
-        (
-            &format!("library={}/strict.so", folder.path().display()),
-            "it lacks: hdInitDevice",
-        ),
-    ] {
+/// Each of these options is refused, and what is wrong is named.
+fn refused(bare: &str, options: &[(&str, &str)]) {
+    for (options, named) in options {
         let said = opened(&format!("{bare},{options}")).err().expect(options);
         assert!(said.contains(named), "{options}: {said}");
     }
-    let choice = format!(
-        "{bare},library={},name=Left Device,force=8,stiffness=800",
-        vendor.display()
-    );
+}
+
+fn not_there_while_unplugged(choice: &str, inside: &Loaded) {
     inside.set("mode", UNPLUGGED);
-    let said = opened(&choice).err().expect("none is plugged in");
+    let said = opened(choice).err().expect("none is plugged in");
     assert!(said.contains("no device found"), "{said}");
     inside.set("mode", GOOD);
+}
 
-    // Where the workbench has it: right, away from the user, up; and turned about the axis to the right.
-    let mut device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
-    assert_eq!(device.info().name, "3D Systems stand-in Touch");
-    let freedoms = (
-        device.info().sensed_degrees_of_freedom,
-        device.info().actuated_degrees_of_freedom,
-    );
-    assert_eq!(freedoms, (6, 3));
-    assert_eq!(device.info().limits.max_force, 8.0);
+/// The first reading has the place of a vendor's stand-in, its second button, and this rotation.
+fn lies_where_the_stand_in_is(mut device: Box<dyn Device>, turn: Vector3<f64>) {
     let begun = Instant::now();
     let sample = loop {
         match device.read(ms(1)) {
@@ -272,19 +251,52 @@ fn openhaptics_functions_are_called_as_published() {
             Err(fault) => assert!(begun.elapsed() < PATIENCE, "{fault}"),
         }
     };
-    let at = sample.pose.translation.vector;
+    let (at, rotation) = (sample.pose.translation.vector, sample.pose.rotation);
     assert!(
         (at.x - 0.03).abs() < 1e-12 && (at.y + 0.02).abs() < 1e-12,
         "{at}"
     );
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::x() * 2.5);
-    assert!(
-        sample.pose.rotation.angle_to(&turn) < 1e-9,
-        "{}",
-        sample.pose.rotation
-    );
+    let turn = UnitQuaternion::from_scaled_axis(turn);
+    assert!(rotation.angle_to(&turn) < 1e-9, "{rotation}");
     assert_eq!(sample.buttons, 2);
-    drop(device);
+}
+
+#[test]
+fn openhaptics_functions_are_called_as_published() {
+    let (folder, bare) = documented("hd");
+    let vendor = stand_in(folder.path(), "stand_in_hd.c", "HD");
+    let inside = Loaded::of(&vendor);
+    refused(
+        &bare,
+        &[
+            (
+                "library=/no/libHD.so",
+                "cannot be loaded (install it; option library=PATH)",
+            ),
+            ("force=1e9", "out of range: force"),
+            ("colour=red", "there are library, name, force, stiffness"),
+            (
+                &format!("library={}/strict.so", folder.path().display()),
+                "it lacks: hdInitDevice",
+            ),
+        ],
+    );
+    let choice = format!(
+        "{bare},library={},name=Left Device,force=8,stiffness=800",
+        vendor.display()
+    );
+    not_there_while_unplugged(&choice, &inside);
+
+    // Where the workbench has it: right, away from the user, up; and turned about the axis to the right.
+    let device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
+    assert_eq!(device.info().name, "3D Systems stand-in Touch");
+    let freedoms = (
+        device.info().sensed_degrees_of_freedom,
+        device.info().actuated_degrees_of_freedom,
+    );
+    assert_eq!(freedoms, (6, 3));
+    assert_eq!(device.info().limits.max_force, 8.0);
+    lies_where_the_stand_in_is(device, Vector3::x() * 2.5);
     inside.wait("it is closed", &|| inside.get("closes") > 0);
 
     let modes = [
@@ -302,33 +314,30 @@ fn force_dimension_s_functions_are_called_as_published() {
     let (folder, bare) = documented("dhd");
     let vendor = stand_in(folder.path(), "stand_in_dhd.c", "DHD");
     let inside = Loaded::of(&vendor);
-    for (options, named) in [
-        (
-            "library=/no/libdhd.so",
-            "cannot be loaded (option library=PATH)",
-        ),
-        ("force=1e9", "out of range: force"),
-        ("colour=red", "there are library, id, force"),
-        ("id", "write NAME=VALUE instead of: id"),
-        (
-            &format!("library={}/strict.so", folder.path().display()),
-            "it lacks: dhdOpenID",
-        ),
-    ] {
-        let said = opened(&format!("{bare},{options}")).err().expect(options);
-        assert!(said.contains(named), "{options}: {said}");
-    }
+    refused(
+        &bare,
+        &[
+            (
+                "library=/no/libdhd.so",
+                "cannot be loaded (option library=PATH)",
+            ),
+            ("force=1e9", "out of range: force"),
+            ("colour=red", "there are library, id, force"),
+            ("id", "write NAME=VALUE instead of: id"),
+            (
+                &format!("library={}/strict.so", folder.path().display()),
+                "it lacks: dhdOpenID",
+            ),
+        ],
+    );
     let choice = format!(
         "{bare},library={},id=2,force=8,torque=0.3",
         vendor.display()
     );
-    inside.set("mode", UNPLUGGED);
-    let said = opened(&choice).err().expect("none is plugged in");
-    assert!(said.contains("no device found"), "{said}");
-    inside.set("mode", GOOD);
+    not_there_while_unplugged(&choice, &inside);
 
     // Where the workbench has it: right, away from the user, up; and turned about the axis away from the user.
-    let mut device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
+    let device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
     assert_eq!(device.info().name, "Force Dimension stand-in.6");
     assert_eq!(
         (
@@ -337,26 +346,7 @@ fn force_dimension_s_functions_are_called_as_published() {
         ),
         (8.0, 0.3)
     );
-    let begun = Instant::now();
-    let sample = loop {
-        match device.read(ms(1)) {
-            Ok(sample) => break sample,
-            Err(fault) => assert!(begun.elapsed() < PATIENCE, "{fault}"),
-        }
-    };
-    let at = sample.pose.translation.vector;
-    assert!(
-        (at.x - 0.03).abs() < 1e-12 && (at.y + 0.02).abs() < 1e-12,
-        "{at}"
-    );
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::y() * -2.5);
-    assert!(
-        sample.pose.rotation.angle_to(&turn) < 1e-9,
-        "{}",
-        sample.pose.rotation
-    );
-    assert_eq!(sample.buttons, 2);
-    drop(device);
+    lies_where_the_stand_in_is(device, Vector3::y() * -2.5);
 
     let modes = [
         (HANGS, "was lost"),

@@ -16,21 +16,8 @@ use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::{BridgeArgs, BridgeReport, DeviceLimits, MAX_EDGE_DELAY};
 use taut_link::{ClientOptions, Role, connect, create_key_file};
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
+use taut_test_kit::BALL_ON_FLOOR;
 
-/// A ball over a half-space, both exact: 1000 N/m.
-const SCENE: &str = r#"
-name = "ball on floor"
-[god_object]
-shape = { sphere = { radius = 0.020 } }
-mass = 1.0
-pose = { position = [0.0, 0.0, 0.040] }
-[[obstacle]]
-name = "floor"
-shape = { plane = { axis = "z" } }
-[coupling]
-k_s = 0.5
-k_h = 2000.0
-"#;
 const STIFFNESS: f64 = 1000.0;
 const RADIUS: f64 = 0.02;
 /// The force starts this far above the floor: 1e-4 of the ball's size, m.
@@ -72,7 +59,7 @@ fn run(coupling: &str) -> Run {
         std::fs::write(&path, text).expect("a file");
         path
     };
-    let (scene, path) = (file("scene.toml", SCENE), file("path.csv", PATH));
+    let (scene, path) = (file("scene.toml", BALL_ON_FLOOR), file("path.csv", PATH));
     let key_path = folder.path().join("key");
     let key = create_key_file(&key_path).expect("a key");
 

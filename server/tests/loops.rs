@@ -23,10 +23,9 @@ struct VirtualSession {
 }
 
 fn sphere_on_plane() -> BuiltScene {
-    match Scene::named_or_file("sphere-on-plane").and_then(|scene| scene.build()) {
-        Ok(scene) => scene,
-        Err(error) => panic!("{error}"),
-    }
+    Scene::named_or_file("sphere-on-plane")
+        .and_then(|scene| scene.build())
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The hand goes down to 10 mm below the plane's surface within a second, waits a second, and comes up again.
@@ -53,10 +52,8 @@ fn pressing_hand(scene: &BuiltScene) -> SimulatedDevice {
 impl VirtualSession {
     fn new(scene: &BuiltScene, device: Box<dyn Device>, start: &Pose) -> Self {
         let world = Arc::new(scene.world.clone());
-        let god_object = match GodObject::new(world.clone(), scene.settings, *start) {
-            Ok(god_object) => god_object,
-            Err(error) => panic!("{error}"),
-        };
+        let god_object = GodObject::new(world.clone(), scene.settings, *start)
+            .unwrap_or_else(|error| panic!("{error}"));
         let safety = SafetySettings {
             ramp_in: Duration::from_millis(10),
             ..SafetySettings::default()
@@ -83,9 +80,7 @@ impl VirtualSession {
 #[test]
 fn pressing_on_a_plane_gives_a_force_without_penetration_at_any_god_object_rate() {
     let scene = sphere_on_plane();
-    let Some(checker) = PenetrationChecker::new(&scene.world) else {
-        panic!("parry refuses the meshes");
-    };
+    let checker = PenetrationChecker::new(&scene.world).expect("parry refuses the meshes");
     for god_object_ticks in [1, 4, 14] {
         let device = pressing_hand(&scene);
         let start = Pose::translation(0.0, 0.0, 0.04);
@@ -161,18 +156,24 @@ impl Device for Unplugged {
     }
 }
 
-#[test]
-fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
+/// A hand that presses on the plane until its cable is pulled, and the force that it feels, N.
+fn pressed_until(at: Duration) -> (VirtualSession, impl Fn() -> f64) {
     let scene = sphere_on_plane();
-    let written = Arc::default();
+    let written: Arc<std::sync::Mutex<Vector3<f64>>> = Arc::default();
     let device = Unplugged {
         device: pressing_hand(&scene),
-        at: Duration::from_millis(1500),
+        at,
         written: Arc::clone(&written),
     };
-    let mut session =
-        VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
-    let felt = || written.lock().map(|force| force.norm()).unwrap_or(f64::NAN);
+    let start = Pose::translation(0.0, 0.0, 0.04);
+    let session = VirtualSession::new(&scene, Box::new(device), &start);
+    let felt = move || written.lock().map(|force| force.norm()).unwrap_or(f64::NAN);
+    (session, felt)
+}
+
+#[test]
+fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
+    let (mut session, felt) = pressed_until(Duration::from_millis(1500));
     for _ in 0..1499 {
         session.tick(1);
     }
@@ -198,19 +199,10 @@ fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
 
 #[test]
 fn a_silent_coupling_lets_the_force_fade() {
-    let scene = sphere_on_plane();
-    let written = Arc::default();
-    let device = Unplugged {
-        device: pressing_hand(&scene),
-        at: Duration::MAX,
-        written: Arc::clone(&written),
-    };
-    let mut session =
-        VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    let (mut session, felt) = pressed_until(Duration::MAX);
     for _ in 0..1500 {
         session.tick(1);
     }
-    let felt = || written.lock().map(|force| force.norm()).unwrap_or(f64::NAN);
     assert!(felt() > 2.0);
     for _ in 0..150 {
         session.now += TICK;
@@ -221,19 +213,10 @@ fn a_silent_coupling_lets_the_force_fade() {
 
 #[test]
 fn constraints_older_than_a_tenth_of_a_second_let_the_force_fade() {
-    let scene = sphere_on_plane();
-    let written = Arc::default();
-    let device = Unplugged {
-        device: pressing_hand(&scene),
-        at: Duration::MAX,
-        written: Arc::clone(&written),
-    };
-    let mut session =
-        VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    let (mut session, felt) = pressed_until(Duration::MAX);
     for _ in 0..1500 {
         session.tick(1);
     }
-    let felt = || written.lock().map(|force| force.norm()).unwrap_or(f64::NAN);
     // Loop 1 hangs; loops 2 and 3 go on.
     let mut hang = |ticks: u32| {
         for _ in 0..ticks {

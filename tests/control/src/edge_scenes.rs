@@ -15,53 +15,11 @@ const DEPTH: f64 = 0.035;
 /// Radius of the ball of wall and corner, m.
 const RADIUS: f64 = 0.02;
 
-const WALL: &str = r#"
-name = "wall"
-[god_object]
-shape = { sphere = { radius = 0.020 } }
-mass = 1.0
-pose = { position = [0.0, 0.0, 0.040] }
-[[obstacle]]
-name = "floor"
-shape = { plane = { axis = "z" } }
-[coupling]
-k_s = 0.5
-k_h = 2000.0
-"#;
-
-const CORNER: &str = r#"
-name = "corner"
-[god_object]
-shape = { sphere = { radius = 0.020 } }
-mass = 1.0
-pose = { position = [0.08, 0.08, 0.050] }
-[[obstacle]]
-name = "floor"
-shape = { plane = { axis = "z" } }
-[[obstacle]]
-name = "left"
-shape = { plane = { axis = "x" } }
-[[obstacle]]
-name = "front"
-shape = { plane = { axis = "y" } }
-[coupling]
-k_s = 0.5
-k_h = 2000.0
-"#;
-
-const DOME: &str = r#"
-name = "dome"
-[god_object]
-shape = { sphere = { radius = 0.020 } }
-mass = 1.0
-pose = { position = [-0.05, 0.0, 0.080] }
-[[obstacle]]
-name = "dome"
-shape = { sphere = { radius = 0.030 } }
-[coupling]
-k_s = 0.5
-k_h = 2000.0
-"#;
+/// A plane through the origin.
+const FLOOR: &str = r#"{ name = "floor", shape = { plane = { axis = "z" } } }"#;
+const LEFT: &str = r#"{ name = "left", shape = { plane = { axis = "x" } } }"#;
+const FRONT: &str = r#"{ name = "front", shape = { plane = { axis = "y" } } }"#;
+const DOME: &str = r#"{ name = "dome", shape = { sphere = { radius = 0.030 } } }"#;
 
 /// A scene and what the hand does there.
 #[derive(Debug)]
@@ -86,7 +44,7 @@ impl Task {
         let pressed = RADIUS - DEPTH;
         Self {
             name: "wall",
-            scene: build(parse(WALL)),
+            scene: ball_before("wall", [0.0, 0.0, 0.04], &[FLOOR]),
             intention: intention(&[
                 (0.0, at(0.0, 0.04)),
                 (0.5, at(0.0, pressed)),
@@ -122,7 +80,7 @@ impl Task {
         let pressed = RADIUS - DEPTH;
         Self {
             name: "corner",
-            scene: build(parse(CORNER)),
+            scene: ball_before("corner", [0.08, 0.08, 0.05], &[FLOOR, LEFT, FRONT]),
             intention: intention(&[
                 (0.0, at(0.08, 0.08, 0.05)),
                 (0.5, at(0.08, 0.08, pressed)),
@@ -143,7 +101,7 @@ impl Task {
         let at = |x, z| Pose::translation(x, 0.0, z);
         Self {
             name: "dome",
-            scene: build(parse(DOME)),
+            scene: ball_before("dome", [-0.05, 0.0, 0.08], &[DOME]),
             intention: intention(&[
                 (0.0, at(-0.05, 0.08)),
                 (0.6, at(-DEPTH / 2.0, DEPTH / 2.0)),
@@ -191,15 +149,29 @@ impl Task {
     }
 }
 
-fn parse(text: &str) -> Result<Scene, taut_scene::SceneError> {
-    Scene::parse("study.toml", text, Path::new(""))
+/// A ball of 1 kg at `start` before exact obstacles.
+fn ball_before(name: &str, start: [f64; 3], obstacles: &[&str]) -> BuiltScene {
+    let text = format!(
+        r#"
+name = "{name}"
+obstacle = [{}]
+[god_object]
+shape = {{ sphere = {{ radius = {RADIUS} }} }}
+mass = 1.0
+pose = {{ position = {start:?} }}
+[coupling]
+k_s = 0.5
+k_h = 2000.0
+"#,
+        obstacles.join(", ")
+    );
+    build(Scene::parse("study.toml", &text, Path::new("")))
 }
 
 fn build(scene: Result<Scene, taut_scene::SceneError>) -> BuiltScene {
-    match scene.and_then(|scene| scene.build()) {
-        Ok(scene) => scene,
-        Err(error) => panic!("{error}"),
-    }
+    scene
+        .and_then(|scene| scene.build())
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn intention(points: &[(f64, Pose)]) -> MinJerkPath {
@@ -207,8 +179,5 @@ fn intention(points: &[(f64, Pose)]) -> MinJerkPath {
         time_s: *time_s,
         pose: *pose,
     });
-    match MinJerkPath::new(via.collect(), false) {
-        Ok(path) => path,
-        Err(error) => panic!("{error}"),
-    }
+    MinJerkPath::new(via.collect(), false).unwrap_or_else(|error| panic!("{error}"))
 }

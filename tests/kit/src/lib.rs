@@ -2,6 +2,21 @@
 
 use std::fmt::Display;
 
+/// A scene: a ball over a half-space, both exact: 1000 N/m.
+pub const BALL_ON_FLOOR: &str = r#"
+name = "ball on floor"
+[god_object]
+shape = { sphere = { radius = 0.020 } }
+mass = 1.0
+pose = { position = [0.0, 0.0, 0.040] }
+[[obstacle]]
+name = "floor"
+shape = { plane = { axis = "z" } }
+[coupling]
+k_s = 0.5
+k_h = 2000.0
+"#;
+
 /// When this is `1`, a test that lacks something fails. The gate sets it.
 pub const REQUIRE_VARIABLE: &str = "TAUT_REQUIRE";
 

@@ -12,6 +12,7 @@ use taut::session::setup::workbench::{Overrides, session_setup};
 use taut::shared::failure::Failure;
 use taut_bridge::{BridgeArgs, BridgeReport, CouplingChoice, HandPreset};
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
+use taut_test_kit::BALL_ON_FLOOR;
 
 use super::{Attack, Finding};
 use crate::bench::BenchError;
@@ -47,21 +48,6 @@ const FELT: f64 = 0.5;
 /// Longest wait for one.
 const PATIENCE: Duration = Duration::from_secs(60);
 const ZERO_AFTER: Duration = Duration::from_millis(120);
-
-/// A ball over a half-space, both exact: 1000 N/m.
-const SCENE: &str = r#"
-name = "ball on floor"
-[god_object]
-shape = { sphere = { radius = 0.020 } }
-mass = 1.0
-pose = { position = [0.0, 0.0, 0.040] }
-[[obstacle]]
-name = "floor"
-shape = { plane = { axis = "z" } }
-[coupling]
-k_s = 0.5
-k_h = 2000.0
-"#;
 
 /// The hand taps and rubs, twice in three seconds.
 const PATH: &str = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.03,1,0,0,0\n0.4,0,0,0.012,1,0,0,0\n0.8,0.04,0,0.01,1,0,0,0\n1.1,0.04,0,0.022,1,0,0,0\n1.5,0,0,0.03,1,0,0,0\n";
@@ -144,7 +130,7 @@ fn run(coupling: CouplingChoice, treatment: Treatment) -> Result<BridgeReport, B
         let path = folder.path().join(name);
         std::fs::write(&path, text).map(|()| path)
     };
-    let (scene, path) = (file("scene.toml", SCENE)?, file("path.csv", PATH)?);
+    let (scene, path) = (file("scene.toml", BALL_ON_FLOOR)?, file("path.csv", PATH)?);
     let key_path = folder.path().join("key");
     let key = taut_link::create_key_file(&key_path).map_err(missing)?;
     let wanted = [
