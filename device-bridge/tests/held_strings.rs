@@ -274,8 +274,6 @@ fn a_path_that_leaves_the_frame_is_told_before_anything_starts() {
     assert!(refused("wb", turning(150_f64.to_radians())).is_none());
     let error = refused("wb", turning(175_f64.to_radians()));
     assert!(error.is_none(), "{error:?}");
-    let Some(error) = string_geometry("no-such-device").err() else {
-        panic!("there is none");
-    };
+    let error = string_geometry("no-such-device").expect_err("there is none");
     assert!(error.to_string().contains("g6x3r"));
 }

@@ -92,15 +92,12 @@ fn a_reader_that_goes_away_ends_a_command_quietly() {
         &["keys", "--out", &key],
         &replay,
     ] {
-        let mut child = match Command::new(env!("CARGO_BIN_EXE_taut"))
+        let mut child = Command::new(env!("CARGO_BIN_EXE_taut"))
             .args(arguments)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
-        {
-            Ok(child) => child,
-            Err(error) => panic!("{error}"),
-        };
+            .unwrap_or_else(|error| panic!("{error}"));
         drop(child.stdout.take());
         let output = child.wait_with_output().unwrap_or_else(|e| panic!("{e}"));
         let error = String::from_utf8_lossy(&output.stderr);
@@ -283,12 +280,8 @@ fn two_nodes_of_one_name_are_refused() {
 #[test]
 fn a_port_in_use_is_named_and_nothing_is_left_running() {
     let place = Workplace::new();
-    let Ok(other) = UdpSocket::bind(("127.0.0.1", 0)) else {
-        panic!("no port");
-    };
-    let Ok(address) = other.local_addr() else {
-        panic!("no address");
-    };
+    let other = UdpSocket::bind(("127.0.0.1", 0)).expect("no port");
+    let address = other.local_addr().expect("no address");
     refused(
         &place.serve("workbench.toml", "30", &["--quic", &address.to_string()]),
         &[&address.to_string(), "in use"],
@@ -302,10 +295,9 @@ fn a_port_in_use_is_named_and_nothing_is_left_running() {
 #[test]
 fn a_server_that_nobody_runs_is_unreachable() {
     let place = Workplace::new();
-    let Ok(silent) = UdpSocket::bind(("127.0.0.1", 0)).and_then(|socket| socket.local_addr())
-    else {
-        panic!("no port");
-    };
+    let silent = UdpSocket::bind(("127.0.0.1", 0))
+        .and_then(|socket| socket.local_addr())
+        .expect("no port");
     let (server, key, out) = (
         silent.to_string(),
         place.text("cluster.key"),
@@ -321,9 +313,9 @@ fn a_server_that_nobody_runs_is_unreachable() {
 #[test]
 fn a_session_is_served_recorded_and_ended_by_a_signal() {
     let place = Workplace::new();
-    let Ok(free) = UdpSocket::bind(("127.0.0.1", 0)).and_then(|socket| socket.local_addr()) else {
-        panic!("no port");
-    };
+    let free = UdpSocket::bind(("127.0.0.1", 0))
+        .and_then(|socket| socket.local_addr())
+        .expect("no port");
     let address = free.to_string();
     let server = start(&place.serve("workbench.toml", "60", &["--quic", &address]));
 
@@ -376,9 +368,9 @@ fn a_session_is_served_recorded_and_ended_by_a_signal() {
         .args(["-TERM", &server.id().to_string()])
         .status();
     assert!(ended.is_ok_and(|status| status.success()));
-    let Ok(output) = server.wait_with_output() else {
-        panic!("the server cannot be waited for");
-    };
+    let output = server
+        .wait_with_output()
+        .expect("the server cannot be waited for");
     assert!(
         output.status.success(),
         "{}",

@@ -22,10 +22,9 @@ const TICK: Duration = Duration::from_millis(1);
 const PLATE: usize = 1;
 
 fn scene() -> BuiltScene {
-    match Scene::named_or_file("moving-plate").and_then(|scene| scene.build()) {
-        Ok(scene) => scene,
-        Err(error) => panic!("{error}"),
-    }
+    Scene::named_or_file("moving-plate")
+        .and_then(|scene| scene.build())
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn motion(scene: &BuiltScene) -> &BuiltMotion {
@@ -73,10 +72,8 @@ struct VirtualSession {
 impl VirtualSession {
     fn new(scene: &BuiltScene, device: Box<dyn Device>) -> Self {
         let world = Arc::new(scene.world.clone());
-        let god_object = match GodObject::new(world.clone(), scene.settings, scene.start) {
-            Ok(god_object) => god_object,
-            Err(error) => panic!("{error}"),
-        };
+        let god_object = GodObject::new(world.clone(), scene.settings, scene.start)
+            .unwrap_or_else(|error| panic!("{error}"));
         let safety = SafetySettings {
             ramp_in: Duration::from_millis(10),
             ..SafetySettings::default()
@@ -193,9 +190,9 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
         eye_separation: 0.064,
         motion: HeadMotion::Still,
     };
-    let Ok([head]) = source.start(None) else {
-        panic!("a still head has nothing to start");
-    };
+    let [head] = source
+        .start(None)
+        .expect("a still head has nothing to start");
     let WiredLoops {
         mut god_object,
         mut coupling,
@@ -212,9 +209,7 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
         haptics.tick(now);
         coupling.tick(now);
         god_object.tick(|| now);
-        let Some(state) = states.newest(now) else {
-            panic!("a sample each tick");
-        };
+        let state = states.newest(now).expect("a sample each tick");
         let [body] = state.bodies.as_slice() else {
             panic!("one body moves: {:?}", state.bodies);
         };
@@ -244,9 +239,7 @@ fn the_loops_and_the_replay_move_everything_alike() {
         scene.start,
         None,
     );
-    let Ok(replay) = replay else {
-        panic!("the scene starts free");
-    };
+    let replay = replay.expect("the scene starts free");
     let mut replay = replay.with_motions(scene.motions.clone());
     let first = session.now + TICK;
     for _ in 0..8000 {
@@ -296,14 +289,13 @@ fn the_energy_of_a_hand_that_is_pushed_is_the_obstacles_and_not_the_couplings() 
 #[test]
 fn a_rigid_hand_takes_no_energy_and_the_plate_gets_back_what_it_put_in() {
     let scene = scene();
-    let Ok(replay) = Replay::new(
+    let replay = Replay::new(
         Arc::new(scene.world.clone()),
         scene.settings,
         scene.start,
         None,
-    ) else {
-        panic!("the scene starts free");
-    };
+    )
+    .expect("the scene starts free");
     let mut replay = replay.with_motions(scene.motions.clone());
     let mut most_work: f64 = 0.0;
     for row in 0..8000_u32 {

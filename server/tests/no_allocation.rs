@@ -36,10 +36,9 @@ fn loops_two_and_three_allocate_nothing() {
         ("sphere-on-plane", Some("g6x3r")),
         ("peg-in-a-hole", Some("wb")),
     ] {
-        let scene = match Scene::named_or_file(name).and_then(|scene| scene.build()) {
-            Ok(scene) => scene,
-            Err(error) => panic!("{error}"),
-        };
+        let scene = Scene::named_or_file(name)
+            .and_then(|scene| scene.build())
+            .unwrap_or_else(|error| panic!("{error}"));
         let wanted = Device::Simulated {
             hand: None,
             path: None,
@@ -55,12 +54,9 @@ fn loops_two_and_three_allocate_nothing() {
             panic!("{name} starts in penetration");
         };
         // Recorded, too.
-        let Ok(directory) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
-        let Ok((taps, _recorder)) = Recorder::start(directory.path(), manifest(), "") else {
-            panic!("cannot record");
-        };
+        let directory = tempfile::tempdir().expect("no temporary directory");
+        let (taps, _recorder) =
+            Recorder::start(directory.path(), manifest(), "").expect("cannot record");
         let mut loops = WiredLoops::new(
             &world,
             &scene.settings,

@@ -15,9 +15,7 @@ const LONG_PATIENCE: Duration = Duration::from_secs(60);
 /// What a child writes to standard error, as it comes.
 fn follow_errors(child: &mut Child) -> Arc<Mutex<String>> {
     let text = Arc::new(Mutex::new(String::new()));
-    let Some(mut pipe) = child.stderr.take() else {
-        panic!("no pipe");
-    };
+    let mut pipe = child.stderr.take().expect("no pipe");
     let shared = text.clone();
     let reader = std::thread::Builder::new()
         .name("errors".into())
@@ -107,9 +105,9 @@ fn a_recording_goes_on_when_its_server_was_killed_and_comes_back() {
 #[test]
 fn a_recording_ends_with_the_server_that_stops_unless_told_to_stay() {
     let place = Workplace::new();
-    let Ok(free) = UdpSocket::bind(("127.0.0.1", 0)).and_then(|socket| socket.local_addr()) else {
-        panic!("no port");
-    };
+    let free = UdpSocket::bind(("127.0.0.1", 0))
+        .and_then(|socket| socket.local_addr())
+        .expect("no port");
     let (address, key) = (free.to_string(), place.text("cluster.key"));
     // Nobody is there yet: who stays waits.
     let record = |out: &str, more: &[&str]| {

@@ -26,28 +26,23 @@ const UPDATES: u64 = 200;
 
 fn record(scene: &str, directory: &Path) {
     let free_ports = ["network.quic_port=0", "network.udp_port=0"];
-    let workbench = match Workbench::parse_with_overrides(
+    let workbench = Workbench::parse_with_overrides(
         "workbench.toml",
         SHIPPED_WORKBENCH,
         Path::new(""),
         &free_ports,
-    ) {
-        Ok(workbench) => workbench,
-        Err(error) => panic!("{error}"),
-    };
-    let Ok(key) = ClusterKey::generate() else {
-        panic!("no random numbers");
-    };
+    )
+    .unwrap_or_else(|error| panic!("{error}"));
+    let key = ClusterKey::generate().expect("no random numbers");
     let overrides = Overrides {
         scene: Some(scene.to_owned()),
         no_monitor: true,
         recording: Some(directory.to_path_buf()),
         ..Overrides::default()
     };
-    let session = match session_setup(&workbench, key, &overrides).and_then(Session::start) {
-        Ok(session) => session,
-        Err(error) => panic!("{error}"),
-    };
+    let session = session_setup(&workbench, key, &overrides)
+        .and_then(Session::start)
+        .unwrap_or_else(|error| panic!("{error}"));
     let begun = Instant::now();
     // The recorder writes to the files while it records: a busy machine may take longer for as many rows.
     let rows = |name: &str| {
@@ -74,10 +69,7 @@ fn exported(recording: &Path, out: &Path) -> serde_json::Value {
     let output = taut(&[&arguments[..], &["--json".as_ref()]].concat());
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && out.is_file(), "{said}");
-    match serde_json::from_slice(&output.stdout) {
-        Ok(report) => report,
-        Err(error) => panic!("{error}"),
-    }
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn replaced(path: &Path, change: impl FnOnce(String) -> String) {
@@ -89,9 +81,7 @@ fn replaced(path: &Path, change: impl FnOnce(String) -> String) {
 
 #[test]
 fn a_recorded_session_is_computed_again_bit_by_bit() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
     for scene in ["sphere-on-plane", "peg-in-a-hole", "moving-plate"] {
         let out = directory.path().join(format!("{scene}.csv"));
         let mut attempts = (0..ATTEMPTS).map(|attempt| {
@@ -130,9 +120,7 @@ fn a_recorded_session_is_computed_again_bit_by_bit() {
 
 #[test]
 fn a_recording_that_was_changed_is_found_out() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
     let path = directory.path().join("session");
     record("sphere-on-plane", &path);
 
@@ -214,9 +202,7 @@ fn a_recording_that_was_changed_is_found_out() {
 
 #[test]
 fn an_export_needs_a_recording_and_leaves_nothing_without_one() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
     let out = directory.path().join("out.mcap");
     let arguments = [
         "export".as_ref(),
@@ -232,9 +218,7 @@ fn an_export_needs_a_recording_and_leaves_nothing_without_one() {
 
 #[test]
 fn a_recording_is_never_written_over_another() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
     record("sphere-on-plane", directory.path());
     let second = std::panic::catch_unwind(|| record("sphere-on-plane", directory.path()));
     assert!(second.is_err());

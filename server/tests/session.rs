@@ -24,24 +24,20 @@ use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn setup() -> SessionSetup {
-    let Ok(key) = ClusterKey::generate() else {
-        panic!("no random numbers");
-    };
+    let key = ClusterKey::generate().expect("no random numbers");
     setup_of("sphere-on-plane", key)
 }
 
 fn setup_of(scene: &str, key: ClusterKey) -> SessionSetup {
     let scene = format!("scene=\"{scene}\"");
     let free_ports = ["network.quic_port=0", "network.udp_port=0", scene.as_str()];
-    let workbench = match Workbench::parse_with_overrides(
+    let workbench = Workbench::parse_with_overrides(
         "workbench.toml",
         SHIPPED_WORKBENCH,
         Path::new(""),
         &free_ports,
-    ) {
-        Ok(workbench) => workbench,
-        Err(error) => panic!("{error}"),
-    };
+    )
+    .unwrap_or_else(|error| panic!("{error}"));
     match session_setup(
         &workbench,
         key,
@@ -94,18 +90,14 @@ fn a_loop_that_breaks_ends_the_session_without_force_and_says_why() {
         good_reads: 300,
         written: Arc::clone(&written),
     }));
-    let Ok(session) = Session::start(setup) else {
-        panic!("the session does not start");
-    };
+    let session = Session::start(setup).expect("the session does not start");
     let begun = Instant::now();
     while !session.is_ending() && begun.elapsed() < PATIENCE {
         std::thread::sleep(Duration::from_millis(10));
     }
     assert!(session.is_ending(), "nobody noticed");
     let (report, failure) = session.stop(&Terminal::standard_error());
-    let Some(failure) = failure else {
-        panic!("the failure was not told");
-    };
+    let failure = failure.expect("the failure was not told");
     assert!(failure.to_string().contains("haptics"), "{failure}");
     assert_eq!(failure.exit_code(), taut::shared::failure::EXIT_FAILED);
     assert!(report.haptics_period_us.count > 10);
@@ -117,9 +109,7 @@ fn a_loop_that_breaks_ends_the_session_without_force_and_says_why() {
 
 #[test]
 fn a_session_that_is_dropped_gives_its_ports_back() {
-    let Ok(session) = Session::start(setup()) else {
-        panic!("the session does not start");
-    };
+    let session = Session::start(setup()).expect("the session does not start");
     let (Some(quic), Some(udp)) = (session.quic_address(), session.udp_address()) else {
         panic!("no addresses");
     };
@@ -138,20 +128,14 @@ fn a_session_that_is_dropped_gives_its_ports_back() {
 
 /// What `taut arm` says of a session without a device, which ends as soon as the request is there.
 fn answer_of_a_session_that_ends(key_file: &Path) -> String {
-    let Ok(key) = read_key_file(key_file) else {
-        panic!("the key cannot be read");
-    };
+    let key = read_key_file(key_file).expect("the key cannot be read");
     let mut setup = setup_of("sphere-on-plane", key);
     setup.device = DeviceSource::Remote {
         limits: DeviceLimits::UNLIMITED,
         max_age: Duration::from_millis(100),
     };
-    let Ok(mut session) = Session::start(setup) else {
-        panic!("the session does not start");
-    };
-    let Some(server) = session.quic_address() else {
-        panic!("no address");
-    };
+    let mut session = Session::start(setup).expect("the session does not start");
+    let server = session.quic_address().expect("no address");
     let asked = ArmArgs {
         server: server.to_string(),
         key: Some(key_file.to_path_buf()),
@@ -165,9 +149,7 @@ fn answer_of_a_session_that_ends(key_file: &Path) -> String {
                 .build()?;
             Ok::<_, std::io::Error>(runtime.block_on(arm::run(&asked)))
         });
-    let Ok(asking) = asking else {
-        panic!("no thread");
-    };
+    let asking = asking.expect("no thread");
     let begun = Instant::now();
     while !session.status_line().contains("clients 1") && !asking.is_finished() {
         assert!(begun.elapsed() < PATIENCE, "nobody joins");
@@ -183,9 +165,7 @@ fn answer_of_a_session_that_ends(key_file: &Path) -> String {
 
 #[test]
 fn who_asks_for_force_is_told_when_the_session_ends_before_it_answers() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
     let key_file = directory.path().join("cluster.key");
     assert!(create_key_file(&key_file).is_ok());
     // On a busy machine the request may have been given up before the session was ended: then once more.
@@ -207,26 +187,20 @@ fn received(
     key: ClusterKey,
     enough: impl Fn(&[ReceivedState]) -> bool,
 ) -> Vec<ReceivedState> {
-    let Some(server) = session.quic_address() else {
-        panic!("no address");
-    };
-    let runtime = match tokio::runtime::Builder::new_current_thread()
+    let server = session.quic_address().expect("no address");
+    let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
-    {
-        Ok(runtime) => runtime,
-        Err(error) => panic!("{error}"),
-    };
+        .unwrap_or_else(|error| panic!("{error}"));
     let mut states = Vec::new();
     runtime.block_on(async {
         let options = ClientOptions {
             connect_timeout: PATIENCE,
             ..ClientOptions::new(server.to_string(), key, Role::Operator, "onlooker")
         };
-        let link = match connect(options).await {
-            Ok(link) => link,
-            Err(error) => panic!("{error}"),
-        };
+        let link = connect(options)
+            .await
+            .unwrap_or_else(|error| panic!("{error}"));
         let plate = &link.description().obstacles[1];
         assert_eq!(
             (plate.name.raw(), plate.pose.position[2]),
@@ -249,12 +223,9 @@ fn received(
 
 #[test]
 fn clients_see_a_plate_rise_under_the_body_and_never_into_it() {
-    let Ok(key) = ClusterKey::generate() else {
-        panic!("no random numbers");
-    };
-    let Ok(session) = Session::start(setup_of("moving-plate", key.clone())) else {
-        panic!("the session does not start");
-    };
+    let key = ClusterKey::generate().expect("no random numbers");
+    let session =
+        Session::start(setup_of("moving-plate", key.clone())).expect("the session does not start");
     // The plate goes round and round: whatever a busy machine misses comes again.
     let states = received(&session, key, |states| {
         let lifted = |state: &ReceivedState| {
@@ -326,10 +297,7 @@ fn those_who_look_on_see_the_session_without_taut_s_client() {
     setup.observers.vrpn.port = 0;
     setup.observers.stream.enabled = true;
     setup.observers.stream.port = 0;
-    let session = match Session::start(setup) {
-        Ok(session) => session,
-        Err(error) => panic!("{error}"),
-    };
+    let session = Session::start(setup).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(session.observers().lines().len(), 2);
     let (Some(stream), Some(vrpn)) = (session.observers().stream(), session.observers().vrpn())
     else {
@@ -341,9 +309,7 @@ fn those_who_look_on_see_the_session_without_taut_s_client() {
         write!(socket, "GET /stream HTTP/1.1\r\nHost: {stream}\r\n\r\n")?;
         Ok(socket)
     });
-    let Ok(socket) = connected else {
-        panic!("the stream of observers is not reached");
-    };
+    let socket = connected.expect("the stream of observers is not reached");
     let mut reader = BufReader::new(socket);
     let hello = line_of(&mut reader, |line| line["type"] == "hello");
     assert_eq!(hello["scene"], "sphere-on-plane");
@@ -355,9 +321,7 @@ fn those_who_look_on_see_the_session_without_taut_s_client() {
     });
     assert_eq!(state["run"], "running");
 
-    let Ok(mut socket) = TcpStream::connect(vrpn) else {
-        panic!("the VRPN server is not reached");
-    };
+    let mut socket = TcpStream::connect(vrpn).expect("the VRPN server is not reached");
     assert!(socket.set_read_timeout(Some(PATIENCE)).is_ok());
     let mut client = taut_vrpn::Client::new("taut", None);
     let mut seen = [false; 3];

@@ -174,9 +174,7 @@ mod tests {
 
     #[test]
     fn the_published_dimensions_are_those_of_the_files() {
-        let Some(geometry) = Geometry::shipped("G6X3R") else {
-            panic!("shipped");
-        };
+        let geometry = Geometry::shipped("G6X3R").expect("shipped");
         // Turned by -45 degrees about y, a square of 0.12 m stands on its corner.
         let corner = 0.06 * std::f64::consts::SQRT_2;
         assert!((geometry.motors[0] - Point3::new(-corner, -0.076, 0.0)).norm() < 1e-12);
@@ -190,9 +188,7 @@ mod tests {
 
     #[test]
     fn the_mdf_frame_has_its_own_order_and_windings() {
-        let Some(geometry) = Geometry::shipped("g6x4r") else {
-            panic!("shipped");
-        };
+        let geometry = Geometry::shipped("g6x4r").expect("shipped");
         let volts = geometry.volts(&[1.0; 8]);
         let signs = volts.map(|volts| volts.map(|volt| (volt * 100.0).round()));
         assert_eq!(signs, Some([8.0, 8.0, -8.0, -8.0, -8.0, -8.0, 8.0, 8.0]));
@@ -206,9 +202,7 @@ mod tests {
 
     #[test]
     fn motors_add_their_inertia_along_the_strings() {
-        let Some(geometry) = Geometry::shipped("wb") else {
-            panic!("shipped");
-        };
+        let geometry = Geometry::shipped("wb").expect("shipped");
         let sum: f64 = [Vector3::x(), Vector3::y(), Vector3::z()]
             .iter()
             .map(|axis| geometry.felt_mass(axis) - geometry.grip_mass)

@@ -321,9 +321,7 @@ mod tests {
 
     #[test]
     fn missing_strings_and_broken_toml_are_refused() {
-        let Some((text, _)) = GOOD.rsplit_once("[[string]]") else {
-            panic!("strings");
-        };
+        let (text, _) = GOOD.rsplit_once("[[string]]").expect("strings");
         assert!(refused(text).contains("there are 7 [[string]], but must be 8"));
         assert!(refused("name = \"x").starts_with("my.toml:1: is no valid TOML"));
         assert!(refused("").contains("is missing"));

@@ -121,9 +121,7 @@ mod tests {
     #[test]
     fn the_basis_renders_nothing_and_the_smallest_renders_the_wrench() {
         for name in Geometry::shipped_names() {
-            let Some(geometry) = Geometry::shipped(name) else {
-                panic!("shipped");
-            };
+            let geometry = Geometry::shipped(name).expect("shipped");
             let pose = Pose::new(
                 Vector3::new(0.01, -0.02, 0.015),
                 Vector3::new(0.3, -0.2, 0.4),

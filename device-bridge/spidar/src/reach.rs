@@ -237,9 +237,7 @@ mod tests {
         let mut state = 11;
         let (mut found, mut none) = (0, 0);
         for name in Geometry::shipped_names() {
-            let Some(geometry) = Geometry::shipped(name) else {
-                panic!("shipped");
-            };
+            let geometry = Geometry::shipped(name).expect("shipped");
             let reach = geometry.half_width() / 3.0;
             let mut warm = Ray::UNKNOWN;
             for _ in 0..2000 {

@@ -78,9 +78,7 @@ mod tests {
 
     #[test]
     fn power_of_tensions_is_power_of_the_wrench() {
-        let Some(geometry) = Geometry::shipped("g6x5r") else {
-            panic!("shipped");
-        };
+        let geometry = Geometry::shipped("g6x5r").expect("shipped");
         let pose = Pose::new(
             Vector3::new(0.01, -0.02, 0.005),
             Vector3::new(0.3, -0.2, 0.4),
@@ -96,9 +94,7 @@ mod tests {
 
     #[test]
     fn length_rates_are_the_derivative_of_the_lengths() {
-        let Some(geometry) = Geometry::shipped("g6x3r") else {
-            panic!("shipped");
-        };
+        let geometry = Geometry::shipped("g6x3r").expect("shipped");
         let pose = Pose::new(
             Vector3::new(0.01, 0.015, -0.01),
             Vector3::new(-0.3, 0.2, 0.1),

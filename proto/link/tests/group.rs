@@ -154,9 +154,9 @@ async fn nodes_speak_to_each_other_without_the_server() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_server_takes_nothing_under_a_group_key() {
     let server = server().await;
-    let Some(inputs) = server.device_inputs() else {
-        panic!("the first taker gets the inputs");
-    };
+    let inputs = server
+        .device_inputs()
+        .expect("the first taker gets the inputs");
     let mut inputs = inputs;
     let bridge = client(&server, Role::Device, "bridge").await;
     let epoch = server.epoch();

@@ -134,9 +134,9 @@ async fn a_client_gets_no_more_states_than_it_asked_for() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn device_input_reaches_the_haptics_loop_and_the_wrench_comes_back() {
     let server = server().await;
-    let Some(mut inputs) = server.device_inputs() else {
-        panic!("the first taker gets the inputs");
-    };
+    let mut inputs = server
+        .device_inputs()
+        .expect("the first taker gets the inputs");
     assert!(server.device_inputs().is_none(), "there is one reader");
     let bridge = client(&server, Role::Device, "bridge").await;
     let mut index = 0;
@@ -175,9 +175,9 @@ async fn device_input_reaches_the_haptics_loop_and_the_wrench_comes_back() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn device_input_of_a_render_node_is_refused() {
     let server = server().await;
-    let Some(mut inputs) = server.device_inputs() else {
-        panic!("the first taker gets the inputs");
-    };
+    let mut inputs = server
+        .device_inputs()
+        .expect("the first taker gets the inputs");
     let render = client(&server, Role::Render, "left").await;
     wait_until("refusal", || {
         render.send_input(&input(1));
@@ -191,9 +191,9 @@ async fn device_input_of_a_render_node_is_refused() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_device_pose_that_is_no_pose_never_reaches_the_loop() {
     let server = server().await;
-    let Some(mut inputs) = server.device_inputs() else {
-        panic!("the first taker gets the inputs");
-    };
+    let mut inputs = server
+        .device_inputs()
+        .expect("the first taker gets the inputs");
     let bridge = client(&server, Role::Device, "bridge").await;
     let mut bent = input(1);
     bent.pose.rotation = [0.5, 0.0, 0.0, 0.0];
@@ -243,9 +243,7 @@ async fn session_time_is_within_its_stated_uncertainty() {
         tokio::time::sleep(Duration::from_millis(300)).await;
         for _ in 0..20 {
             let before = server.clock().now_ns();
-            let Some(time) = client.session_now() else {
-                panic!("a locked clock stays locked");
-            };
+            let time = client.session_now().expect("a locked clock stays locked");
             let after = server.clock().now_ns();
             assert!(
                 time.ns + time.uncertainty_ns >= before,
@@ -394,10 +392,9 @@ async fn the_light_around_the_scene_comes_by_its_hash_and_is_not_served_without(
         Ok(_) => panic!("served without its light"),
     }
     content.panorama = Some(light.clone());
-    let server = match serve(ServerOptions::loopback(key('a')), content).await {
-        Ok(server) => server,
-        Err(error) => panic!("{error}"),
-    };
+    let server = serve(ServerOptions::loopback(key('a')), content)
+        .await
+        .unwrap_or_else(|error| panic!("{error}"));
     let client = client(&server, Role::Render, "left").await;
     assert_eq!(client.description().environment, Some(hash));
     match client.panorama(hash).await {

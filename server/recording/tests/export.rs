@@ -41,9 +41,7 @@ fn force(sequence: u32) -> ForceRecord {
 
 /// Five ticks of which the third is faulty and the fourth has another button, six updates, five forces.
 fn record(directory: &Path) {
-    let Ok((mut taps, recorder)) = Recorder::start(directory, manifest(), "") else {
-        panic!("cannot record");
-    };
+    let (mut taps, recorder) = Recorder::start(directory, manifest(), "").expect("cannot record");
     for sequence in 1..=6 {
         taps.updates.push(update(sequence));
     }
@@ -78,9 +76,7 @@ fn numbers(pose: &Pose) -> [u64; 7] {
 }
 
 fn recorded() -> tempfile::TempDir {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
     record(directory.path());
     directory
 }
@@ -274,17 +270,12 @@ fn a_file_with_another_header_is_left_out() {
 
 #[test]
 fn an_export_can_be_interrupted() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
-    let Ok((mut taps, recorder)) = Recorder::start(directory.path(), manifest(), "") else {
-        panic!("cannot record");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
+    let (mut taps, recorder) =
+        Recorder::start(directory.path(), manifest(), "").expect("cannot record");
     (1..=1500).for_each(|sequence| taps.updates.push(update(sequence)));
     assert!(recorder.finish().failure.is_none());
-    let Ok(recording) = Recording::open(directory.path()) else {
-        panic!("cannot open");
-    };
+    let recording = Recording::open(directory.path()).expect("cannot open");
     let ended = export_mcap(&recording, Err(String::new()), Vec::new(), || true);
     assert!(
         matches!(ended, Err(RecordingError::Interrupted)),

@@ -61,23 +61,16 @@ impl Export {
 }
 
 pub(crate) fn export(directory: &Path, scene: Result<&SceneFrames, String>) -> Export {
-    let recording = match Recording::open(directory) {
-        Ok(recording) => recording,
-        Err(error) => panic!("{error}"),
-    };
+    let recording = Recording::open(directory).unwrap_or_else(|error| panic!("{error}"));
     let mut bytes = Vec::new();
     let report = match export_mcap(&recording, scene, &mut bytes, || false) {
         Ok(report) => report,
         Err(error) => panic!("{error}"),
     };
     let (mut topics, mut times) = (BTreeMap::<_, Vec<_>>::new(), Vec::new());
-    let Ok(stream) = MessageStream::new(&bytes) else {
-        panic!("no MCAP");
-    };
+    let stream = MessageStream::new(&bytes).expect("no MCAP");
     for message in stream {
-        let Ok(message) = message else {
-            panic!("a message that is none");
-        };
+        let message = message.expect("a message that is none");
         assert_eq!(message.channel.message_encoding, "cdr");
         times.push(message.log_time);
         let topic = topics.entry(message.channel.topic.clone()).or_default();

@@ -89,14 +89,10 @@ fn lines(directory: &Path, file: &str) -> Vec<String> {
 
 #[test]
 fn records_come_back_bit_by_bit() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
     let path = directory.path().join("new");
-    let (mut taps, recorder) = match Recorder::start(&path, manifest(), "name = \"none\"\n") {
-        Ok(started) => started,
-        Err(error) => panic!("{error}"),
-    };
+    let (mut taps, recorder) = Recorder::start(&path, manifest(), "name = \"none\"\n")
+        .unwrap_or_else(|error| panic!("{error}"));
     let force = ForceRecord {
         sequence: 1,
         time: Duration::from_nanos(123_456_789),
@@ -137,10 +133,7 @@ fn records_come_back_bit_by_bit() {
     assert!(summary.failure.is_none());
     assert_eq!((summary.updates, summary.ticks), (6, 3));
 
-    let recording = match Recording::open(&path) {
-        Ok(recording) => recording,
-        Err(error) => panic!("{error}"),
-    };
+    let recording = Recording::open(&path).unwrap_or_else(|error| panic!("{error}"));
     assert!(recording.manifest().complete);
     assert_eq!(recording.scene(), "name = \"none\"\n");
     let (Ok(mut updates), Ok(mut forces)) = (recording.updates(), recording.forces()) else {
@@ -185,12 +178,9 @@ fn records_come_back_bit_by_bit() {
 
 #[test]
 fn a_writer_that_falls_behind_makes_the_recording_incomplete() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
-    let Ok((mut taps, recorder)) = Recorder::start(directory.path(), manifest(), "") else {
-        panic!("an empty directory is good enough");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
+    let (mut taps, recorder) = Recorder::start(directory.path(), manifest(), "")
+        .expect("an empty directory is good enough");
     // Far more than the queue holds, faster than lines can be written.
     let pushed = 1_000_000;
     for _ in 0..pushed {
@@ -199,18 +189,14 @@ fn a_writer_that_falls_behind_makes_the_recording_incomplete() {
     let summary = recorder.finish();
     assert!(summary.lost.updates > 0);
     assert_eq!(summary.updates + summary.lost.updates, pushed);
-    let Ok(recording) = Recording::open(directory.path()) else {
-        panic!("an incomplete recording can be read");
-    };
+    let recording = Recording::open(directory.path()).expect("an incomplete recording can be read");
     assert!(!recording.manifest().complete);
     assert_eq!(recording.manifest().lost, summary.lost);
 }
 
 #[test]
 fn a_directory_with_something_in_it_is_left_alone() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
     let kept = directory.path().join("mine.txt");
     assert!(std::fs::write(&kept, "mine").is_ok());
     let started = Recorder::start(directory.path(), manifest(), "");
@@ -220,26 +206,17 @@ fn a_directory_with_something_in_it_is_left_alone() {
 
 #[test]
 fn a_line_that_was_cut_off_is_named() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
-    let Ok((mut taps, recorder)) = Recorder::start(directory.path(), manifest(), "") else {
-        panic!("cannot record");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
+    let (mut taps, recorder) =
+        Recorder::start(directory.path(), manifest(), "").expect("cannot record");
     taps.updates.push(update(1));
     taps.updates.push(update(2));
     assert!(recorder.finish().failure.is_none());
     let path = directory.path().join("updates.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        panic!("no updates");
-    };
+    let text = std::fs::read_to_string(&path).expect("no updates");
     assert!(std::fs::write(&path, &text[..text.len() - 40]).is_ok());
-    let Ok(recording) = Recording::open(directory.path()) else {
-        panic!("cannot open");
-    };
-    let Ok(mut updates) = recording.updates() else {
-        panic!("no updates");
-    };
+    let recording = Recording::open(directory.path()).expect("cannot open");
+    let mut updates = recording.updates().expect("no updates");
     assert!(matches!(updates.next_record(), Ok(Some(_))));
     match updates.next_record() {
         Err(error) => assert!(error.to_string().contains("updates.csv, line 3"), "{error}"),
@@ -250,24 +227,18 @@ fn a_line_that_was_cut_off_is_named() {
 /// What is left of the last number is a number, too: another one.
 #[test]
 fn a_line_that_was_cut_off_in_its_last_number_is_no_line() {
-    let Ok(directory) = tempfile::tempdir() else {
-        panic!("no temporary directory");
-    };
-    let Ok((mut taps, recorder)) = Recorder::start(directory.path(), manifest(), "") else {
-        panic!("cannot record");
-    };
+    let directory = tempfile::tempdir().expect("no temporary directory");
+    let (mut taps, recorder) =
+        Recorder::start(directory.path(), manifest(), "").expect("cannot record");
     taps.updates.push(update(1));
     assert!(recorder.finish().failure.is_none());
     let path = directory.path().join("updates.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        panic!("no updates");
-    };
+    let text = std::fs::read_to_string(&path).expect("no updates");
     assert!(text.ends_with(",0.1\n"));
     assert!(std::fs::write(&path, &text[..text.len() - 2]).is_ok()); // ",0."
-    let Ok(mut updates) = Recording::open(directory.path()).and_then(|opened| opened.updates())
-    else {
-        panic!("no updates");
-    };
+    let mut updates = Recording::open(directory.path())
+        .and_then(|opened| opened.updates())
+        .expect("no updates");
     match updates.next_record() {
         Err(error) => assert!(error.to_string().contains("no end"), "{error}"),
         other => panic!("{other:?}"),

@@ -49,10 +49,7 @@ mod tests {
 
     /// Problems, and notes.
     fn report(scene: &str, changes: &[(&str, &str)]) -> (Vec<String>, Vec<String>) {
-        let directory = match tempfile::tempdir() {
-            Ok(directory) => directory,
-            Err(error) => panic!("{error}"),
-        };
+        let directory = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
         let mut text = SHIPPED_WORKBENCH.to_owned();
         for (old, new) in changes {
             assert!(text.contains(old), "{old}");

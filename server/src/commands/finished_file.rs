@@ -121,9 +121,7 @@ mod tests {
 
     #[test]
     fn what_is_read_for_the_answer_is_not_replaced() {
-        let Ok(directory) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
+        let directory = tempfile::tempdir().expect("no temporary directory");
         let [input, output] = ["trace.csv", "answer.csv"].map(|name| directory.path().join(name));
         assert!(fs::write(&input, "precious").is_ok());
         let kind = |path: &Path, input: &Path| {
@@ -142,20 +140,14 @@ mod tests {
     #[test]
     fn a_pipe_is_written_to_and_stays_one() {
         use std::os::unix::fs::FileTypeExt;
-        let Ok(directory) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
+        let directory = tempfile::tempdir().expect("no temporary directory");
         let path = directory.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&path).status();
         assert!(made.is_ok_and(|status| status.success()));
         let mut reader = std::process::Command::new("cat");
         let reader = reader.arg(&path).stdout(std::process::Stdio::piped());
-        let Ok(reader) = reader.spawn() else {
-            panic!("nobody reads");
-        };
-        let Ok(mut file) = FinishedFile::create(&path, &[]) else {
-            panic!("cannot write");
-        };
+        let reader = reader.spawn().expect("nobody reads");
+        let mut file = FinishedFile::create(&path, &[]).expect("cannot write");
         assert!(file.write_all(b"whole").is_ok());
         assert!(file.finish().is_ok());
         let read = reader.wait_with_output();
@@ -169,9 +161,7 @@ mod tests {
     #[test]
     fn what_is_replaced_keeps_its_permissions_and_its_link() {
         use std::os::unix::fs::PermissionsExt;
-        let Ok(directory) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
+        let directory = tempfile::tempdir().expect("no temporary directory");
         let [path, link] = ["scene.toml", "link.toml"].map(|name| directory.path().join(name));
         assert!(
             replace(&path, "new").is_err(),
@@ -190,23 +180,17 @@ mod tests {
 
     #[test]
     fn the_name_appears_only_when_the_file_is_finished() {
-        let Ok(directory) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
+        let directory = tempfile::tempdir().expect("no temporary directory");
         let path = directory.path().join("out.csv");
         let entries = || fs::read_dir(directory.path()).map_or(0, Iterator::count);
 
-        let Ok(mut dropped) = FinishedFile::create(&path, &[]) else {
-            panic!("cannot write");
-        };
+        let mut dropped = FinishedFile::create(&path, &[]).expect("cannot write");
         assert!(dropped.write_all(b"half").is_ok());
         assert!(!path.exists());
         drop(dropped);
         assert_eq!(entries(), 0);
 
-        let Ok(mut finished) = FinishedFile::create(&path, &[]) else {
-            panic!("cannot write");
-        };
+        let mut finished = FinishedFile::create(&path, &[]).expect("cannot write");
         assert!(finished.write_all(b"whole").is_ok());
         assert!(finished.finish().is_ok());
         assert!(fs::read(&path).is_ok_and(|bytes| bytes == b"whole"));

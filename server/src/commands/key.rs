@@ -46,9 +46,7 @@ mod tests {
 
     #[test]
     fn a_file_that_is_missing_or_no_key_is_bad_input_and_is_named() {
-        let Ok(directory) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
+        let directory = tempfile::tempdir().expect("no temporary directory");
         let path = directory.path().join("short.key");
         assert!(std::fs::write(&path, "abc").is_ok());
         for path in [path, directory.path().join("missing.key")] {

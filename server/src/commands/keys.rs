@@ -263,19 +263,12 @@ mod tests {
     fn a_workbench_gets_a_credential_for_every_node_and_role_and_none_shows_its_secret() {
         let directory = KeyDirectory::new();
         let master = directory.path("cluster.key");
-        let Ok(report) = keys(&["--out", &master]) else {
-            panic!("no key");
-        };
+        let report = keys(&["--out", &master]).expect("no key");
         let config = directory.write("workbench.toml", SHIPPED_WORKBENCH);
         let out = directory.path("out");
         let line = ["--master", &master, "--config", &config, "--out", &out];
-        let all = match keys(&line) {
-            Ok(all) => all,
-            Err(error) => panic!("{error}"),
-        };
-        let Ok(key) = read_key_file(Path::new(&master)) else {
-            panic!("no key");
-        };
+        let all = keys(&line).unwrap_or_else(|error| panic!("{error}"));
+        let key = read_key_file(Path::new(&master)).expect("no key");
         assert!(report.contains(&key.server_pin().to_string()), "{report}");
         let mut files = 0;
         for entry in fs::read_dir(&out).into_iter().flatten().flatten() {

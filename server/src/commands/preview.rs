@@ -178,9 +178,7 @@ mod tests {
                 return None;
             }
         };
-        let Ok(picture) = preview.picture(0) else {
-            panic!("not drawn");
-        };
+        let picture = preview.picture(0).expect("not drawn");
         let strong = |pixel: &[u8; 4], part: usize| {
             let others = (0..3)
                 .filter(|other| *other != part)
@@ -199,9 +197,7 @@ mod tests {
 
     #[test]
     fn the_colour_of_a_gltf_material_reaches_the_pixels_unless_the_scene_says_another() {
-        let Ok(folder) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
+        let folder = tempfile::tempdir().expect("no temporary directory");
         let green = r#"{"pbrMetallicRoughness":{"baseColorFactor":[0.02,0.6,0.02,1],"metallicFactor":0,"roughnessFactor":0.6}}"#;
         write_box(folder.path(), green);
         let shape = "shape = { mesh = \"box.gltf\" }\n";
@@ -210,17 +206,13 @@ mod tests {
         };
         assert!(green > 10_000 && red + blue == 0, "{red} {green} {blue}");
         let said = format!("{shape}color = \"#ff1010\"\n");
-        let Some([red, green, blue]) = counts(folder.path(), &said) else {
-            panic!("there was an adapter");
-        };
+        let [red, green, blue] = counts(folder.path(), &said).expect("there was an adapter");
         assert!(red > 10_000 && green + blue == 0, "{red} {green} {blue}");
     }
 
     #[test]
     fn scenery_is_drawn_and_so_is_what_stands_in_its_own_colour() {
-        let Ok(folder) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
+        let folder = tempfile::tempdir().expect("no temporary directory");
         let rest = "shape = { sphere = { radius = 0.01 } }\ncolor = [0.8, 0.02, 0.02]\n\
             [[obstacle]]\nname = \"o\"\nshape = { box = { half_extents = [0.01, 0.01, 0.01] } }\n\
             pose = { position = [0.05, 0.0, 0.0] }\ncolor = [0.02, 0.6, 0.02]\n\

@@ -474,9 +474,9 @@ mod tests {
         };
         wrenches.publish(&wrench);
 
-        let Some(state) = writer.newest(Duration::from_millis(7)) else {
-            panic!("a sample was published");
-        };
+        let state = writer
+            .newest(Duration::from_millis(7))
+            .expect("a sample was published");
         assert_eq!(
             (state.tick, state.sample_time_ns, state.scene_revision),
             (5, 5_000_000, 7)
@@ -531,9 +531,9 @@ mod tests {
             faulty: true,
             ..device
         });
-        let Some(state) = writer.newest(Duration::from_millis(9)) else {
-            panic!("a sample was published");
-        };
+        let state = writer
+            .newest(Duration::from_millis(9))
+            .expect("a sample was published");
         assert!((state.tools[0].linear_velocity[2] + 1.0).abs() < 1e-6);
         assert_eq!(state.bodies.len(), 1, "told again, not added");
         assert_eq!(state.run, RunState::Fault);

@@ -13,9 +13,7 @@ pub(crate) struct Workplace {
 impl Workplace {
     /// With a workbench file of a plain scene.
     pub(crate) fn new() -> Self {
-        let Ok(directory) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
+        let directory = tempfile::tempdir().expect("no temporary directory");
         let workplace = Self { directory };
         workplace.write("workbench.toml", &workbench());
         let output = taut(&["keys", "--out", workplace.text("cluster.key").as_str()]);

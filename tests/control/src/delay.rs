@@ -262,10 +262,8 @@ impl Server {
     fn new(task: &Task) -> Self {
         let scene = &task.scene;
         let world = Arc::new(scene.world.clone());
-        let god_object = match GodObject::new(world.clone(), scene.settings, scene.start) {
-            Ok(god_object) => god_object,
-            Err(error) => panic!("{error}"),
-        };
+        let god_object = GodObject::new(world.clone(), scene.settings, scene.start)
+            .unwrap_or_else(|error| panic!("{error}"));
         let (inputs, output) = triple_buffer::TripleBuffer::new(&None).split();
         let (device, wrenches) =
             RemoteDevice::new(output, DeviceLimits::UNLIMITED, DEFAULT_MAX_AGE);

@@ -209,10 +209,7 @@ impl Bridge {
             Ok(CouplingOffer::AtEdge(offer)) => offer,
             other => panic!("{other:?}"),
         };
-        let coupler = match EdgeCoupler::new(&offer) {
-            Ok(coupler) => coupler,
-            Err(error) => panic!("{error}"),
-        };
+        let coupler = EdgeCoupler::new(&offer).unwrap_or_else(|error| panic!("{error}"));
         Self {
             mode,
             device: SimulatedDevice::new(
@@ -253,10 +250,10 @@ impl Bridge {
             }
             _ => {}
         });
-        let sample = match self.device.read(here) {
-            Ok(sample) => sample,
-            Err(fault) => panic!("{fault}"),
-        };
+        let sample = self
+            .device
+            .read(here)
+            .unwrap_or_else(|fault| panic!("{fault}"));
         let felt = self.coupler.step(here, &sample);
         let wrench = match self.mode {
             Mode::Edge => felt.map_or(Vector6::zeros(), |felt| felt.wrench),
@@ -362,8 +359,6 @@ impl Seen {
 #[must_use]
 pub fn god_object(task: &Task) -> GodObject {
     let world = Arc::new(task.scene.world.clone());
-    match GodObject::new(world, task.scene.settings, task.scene.start) {
-        Ok(god_object) => god_object,
-        Err(error) => panic!("{error}"),
-    }
+    GodObject::new(world, task.scene.settings, task.scene.start)
+        .unwrap_or_else(|error| panic!("{error}"))
 }

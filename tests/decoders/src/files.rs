@@ -239,10 +239,8 @@ pub(crate) fn with_file<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) ->
         static DIRECTORY: RefCell<Option<TempDir>> = const { RefCell::new(None) };
     }
     DIRECTORY.with_borrow_mut(|kept| {
-        let directory = kept.get_or_insert_with(|| match tempfile::tempdir() {
-            Ok(directory) => directory,
-            Err(error) => panic!("{error}"),
-        });
+        let directory = kept
+            .get_or_insert_with(|| tempfile::tempdir().unwrap_or_else(|error| panic!("{error}")));
         let path = directory.path().join(name);
         assert!(fs::write(&path, bytes).is_ok(), "{}", path.display());
         read(&path)

@@ -112,9 +112,7 @@ mod tests {
 
     #[test]
     fn a_demo_removes_the_directories_of_dead_demos_and_of_nobody_else() {
-        let Ok(parent) = TempDir::new() else {
-            panic!("no temporary directory");
-        };
+        let parent = TempDir::new().expect("no temporary directory");
         let living = create_in(&parent);
         let killed = create_in(&parent);
         let dead = killed.path().to_path_buf();

@@ -159,13 +159,9 @@ mod tests {
 
     #[test]
     fn a_shipped_device_is_examined_and_drawn() {
-        let Ok(directory) = tempfile::tempdir() else {
-            panic!("no directory for the picture");
-        };
+        let directory = tempfile::tempdir().expect("no directory for the picture");
         let out = directory.path().join("map.svg");
-        let Ok(report) = examine("G6X5R", Some(&out)) else {
-            panic!("a shipped device");
-        };
+        let report = examine("G6X5R", Some(&out)).expect("a shipped device");
         assert!((report.force_n.weakest_axis - 6.77).abs() < 0.01);
         assert!(report.to_string().contains("6.8 N along the weakest axis"));
         assert!(std::fs::read_to_string(&out).is_ok_and(|svg| svg.starts_with("<svg")));
