@@ -84,13 +84,6 @@ impl Drop for Leader {
     }
 }
 
-fn thread(name: &str, body: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
-    std::thread::Builder::new()
-        .name(name.to_owned())
-        .spawn(body)
-        .unwrap_or_else(|error| panic!("{error}"))
-}
-
 /// A node that "draws" for a few milliseconds per frame.
 struct Screen {
     link: Arc<ClientLink>,

@@ -9,7 +9,7 @@ use std::{
 };
 use taut_link::{
     ClientOptions, Credential, FloodLimits, Holder, LinkError, Role, ServerLink, ServerOptions,
-    ServerPin, binding, connect, pinning::PinnedServer, transport,
+    ServerPin, binding, pinning::PinnedServer, transport,
 };
 use taut_proto::{
     Header, Kind, PROTOCOL_VERSION, VersionRange,
@@ -19,13 +19,6 @@ use taut_proto::{
     proof::{Claim, Grant},
 };
 use tokio::sync::mpsc;
-
-async fn error_of(options: ClientOptions) -> LinkError {
-    match connect(options).await {
-        Err(error) => error,
-        Ok(_) => panic!("let in"),
-    }
-}
 
 fn must<T, E: std::fmt::Display>(result: Result<T, E>) -> T {
     result.unwrap_or_else(|error| panic!("{error}"))

@@ -17,14 +17,6 @@ use taut_link::{
 use taut_proto::{ClientStats, MeshBlob, mesh_blob::Positions};
 use tokio::runtime::Runtime;
 
-fn runtime() -> Runtime {
-    tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .unwrap_or_else(|error| panic!("{error}"))
-}
-
 /// A server with a runtime of its own, so that it can die without a word and come back at the same place.
 struct Mortal {
     runtime: Runtime,

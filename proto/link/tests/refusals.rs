@@ -16,13 +16,6 @@ use taut_proto::{
     proof::{Claim, Grant},
 };
 
-async fn error_of(options: ClientOptions) -> LinkError {
-    match connect(options).await {
-        Err(error) => error,
-        Ok(_) => panic!("let in"),
-    }
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_key_of_another_workbench_meets_the_wrong_server_and_says_nothing_to_it() {
     let server = server().await;

@@ -29,13 +29,6 @@ async fn join(options: ClientOptions) -> ClientLink {
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
-async fn error_of(options: ClientOptions) -> LinkError {
-    match connect(options).await {
-        Err(error) => error,
-        Ok(_) => panic!("let in"),
-    }
-}
-
 fn head(index: u64) -> HeadSample {
     HeadSample {
         sample_time_ns: index * 1_000_000,

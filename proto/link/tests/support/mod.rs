@@ -2,10 +2,13 @@
 
 pub mod relay;
 
-use std::time::{Duration, Instant};
+use std::{
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
 use taut_link::{
-    Broadcaster, ClientLink, ClientOptions, ClusterKey, Content, LinkEvent, ReceivedState, Role,
-    ServerLink, ServerOptions, serve,
+    Broadcaster, ClientLink, ClientOptions, ClusterKey, Content, LinkError, LinkEvent,
+    ReceivedState, Role, ServerLink, ServerOptions, connect, serve,
 };
 use taut_proto::{
     HotState, InputSample, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
@@ -13,6 +16,7 @@ use taut_proto::{
     scene::{BodyDescription, NodeDescription, ScreenDescription, Stereo, WindowDescription},
     state::{RunState, ToolState},
 };
+use tokio::runtime::Runtime;
 
 /// Only a hang takes this long; every wait ends as soon as its condition holds.
 pub const PATIENCE: Duration = Duration::from_secs(60);
@@ -252,4 +256,28 @@ pub fn assert_in_order(states: &[ReceivedState]) {
         assert_eq!(received.state, state(received.state.tick));
         assert_eq!(Ok(received.state_hash), received.state.hash());
     }
+}
+
+/// Why a client is not let in.
+pub async fn error_of(options: ClientOptions) -> LinkError {
+    match connect(options).await {
+        Err(error) => error,
+        Ok(_) => panic!("let in"),
+    }
+}
+
+/// A runtime that a test can end before the others.
+pub fn runtime() -> Runtime {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+pub fn thread(name: &str, body: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
+    std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(body)
+        .unwrap_or_else(|error| panic!("{error}"))
 }
