@@ -4,24 +4,11 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use crate::support::floor::{Dice, OnFloor, ms, wait_until};
-use nalgebra::{Point3, Vector6};
+use crate::support::floor::{Dice, Direct, OnFloor, Wire, floor, ms, placement, wait_until};
 use taut_bridge::polhem::{Frame, SimulatedPolhem, force_frame};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::Counters;
-use taut_bridge::{
-    ArmDevice, ArmPort, ArmState, DeviceChoice, Hand, InputChoice, Placement, PolhemSettings, Pose,
-};
-
-fn placement() -> Placement {
-    Placement::plain(Pose::identity(), Point3::origin())
-}
-
-/// A floor 20 mm below the start, with a torque that nobody can render.
-fn floor(pose: &Pose) -> Vector6<f64> {
-    let below = (-0.02 - pose.translation.vector.z).max(0.0);
-    Vector6::new(0.0, 0.0, 200.0 * below, 0.0, 0.4, 0.0)
-}
+use taut_bridge::{ArmDevice, ArmState, DeviceChoice, Hand, InputChoice, PolhemSettings};
 
 #[test]
 fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
@@ -54,14 +41,10 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
     });
 }
 
-/// The wire without a port, under a virtual clock.
-#[derive(Clone)]
-struct Direct(Arc<Mutex<(SimulatedPolhem, ArmState, [f64; 3])>>);
-
-impl Direct {
+impl Direct<SimulatedPolhem> {
     /// A line and its answer.
     fn turn(&self, now: Duration) {
-        let (arm, state, force) = &mut *self.0.lock().expect("not poisoned");
+        let Wire { arm, state, force } = &mut *self.lock();
         let mut answer = Vec::new();
         arm.take(now, &force_frame(force), &mut answer);
         let frame = Frame::parse(&answer).expect("a line");
@@ -76,20 +59,10 @@ impl Direct {
     }
 }
 
-impl ArmPort for Direct {
-    fn newest(&mut self) -> ArmState {
-        self.0.lock().expect("not poisoned").1
-    }
-
-    fn push(&mut self, force: [f64; 3]) {
-        self.0.lock().expect("not poisoned").2 = force;
-    }
-}
-
 #[test]
 fn the_force_is_gone_120_ms_after_the_last_line_and_back_within_a_second() {
     let arm = SimulatedPolhem::new(Hand::LIGHT, None, None);
-    let wire = Direct(Arc::new(Mutex::new((arm, ArmState::default(), [0.0; 3]))));
+    let wire = Direct::of(arm);
     let device = ArmDevice::new(
         Box::new(wire.clone()),
         PolhemSettings::at("here").arm(),

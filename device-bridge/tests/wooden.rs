@@ -4,25 +4,13 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use crate::support::floor::{Dice, OnFloor, ms, wait_until};
-use nalgebra::{Point3, Vector3, Vector6};
+use crate::support::floor::{Dice, Direct, OnFloor, Wire, floor, ms, placement, wait_until};
+use nalgebra::Vector3;
 use taut_bridge::spidar_uart::Counters;
 use taut_bridge::wooden::{
     BoardReport, HostReport, SimulatedWooden, WOODEN_MODELS, WoodenModel, WoodenService,
 };
-use taut_bridge::{
-    ArmDevice, ArmPort, ArmState, DeviceChoice, Hand, InputChoice, Placement, Pose, WoodenSettings,
-};
-
-fn placement() -> Placement {
-    Placement::plain(Pose::identity(), Point3::origin())
-}
-
-/// A floor 20 mm below the start, with a torque that nobody can render.
-fn floor(pose: &Pose) -> Vector6<f64> {
-    let below = (-0.02 - pose.translation.vector.z).max(0.0);
-    Vector6::new(0.0, 0.0, 200.0 * below, 0.0, 0.4, 0.0)
-}
+use taut_bridge::{ArmDevice, ArmState, DeviceChoice, Hand, InputChoice, WoodenSettings};
 
 #[test]
 fn a_floor_is_felt_through_the_reports_and_again_after_the_cable_was_out() {
@@ -79,19 +67,16 @@ fn a_board_that_is_not_there_is_a_sentence() {
     );
 }
 
-/// The wire without a socket, under a virtual clock.
-#[derive(Clone)]
-struct Direct(Arc<Mutex<Ends>>);
-
-/// Arm, newest state, force and encoders.
-type Ends = (SimulatedWooden, ArmState, [f64; 3], [i16; 6]);
-
 const MODEL: WoodenModel = WOODEN_MODELS[0];
 
-impl Direct {
+/// An arm, and the encoders of its last report.
+type Reporting = (SimulatedWooden, [i16; 6]);
+
+impl Direct<Reporting> {
     /// A report and its answer.
     fn turn(&self, now: Duration) {
-        let (arm, state, force, encoders) = &mut *self.0.lock().expect("not poisoned");
+        let Wire { arm, state, force } = &mut *self.lock();
+        let (arm, encoders) = arm;
         let currents = MODEL.currents(encoders, &Vector3::from(*force));
         let answer = arm.take(now, &HostReport::Currents(currents).bytes());
         *encoders = BoardReport::parse(&answer).expect("a report").encoders;
@@ -104,25 +89,10 @@ impl Direct {
     }
 }
 
-impl ArmPort for Direct {
-    fn newest(&mut self) -> ArmState {
-        self.0.lock().expect("not poisoned").1
-    }
-
-    fn push(&mut self, force: [f64; 3]) {
-        self.0.lock().expect("not poisoned").2 = force;
-    }
-}
-
 #[test]
 fn the_force_is_gone_120_ms_after_the_last_report_and_back_within_a_second() {
     let arm = SimulatedWooden::new(MODEL, Hand::LIGHT, None, None);
-    let wire = Direct(Arc::new(Mutex::new((
-        arm,
-        ArmState::default(),
-        [0.0; 3],
-        MODEL.home,
-    ))));
+    let wire = Direct::of((arm, MODEL.home));
     let device = ArmDevice::new(
         Box::new(wire.clone()),
         WoodenSettings::default().arm(),

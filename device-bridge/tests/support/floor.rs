@@ -1,12 +1,14 @@
 //! A floor under a device, felt through its port: in real time, or under a virtual clock; and damage that is the same each time.
 
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use nalgebra::Vector6;
+use nalgebra::{Point3, Vector6};
 use taut_bridge::realtime::monotonic_now;
 use taut_bridge::{
-    Command, CommandSource, Device, DeviceFault, DevicePort, Placement, Pose, SafetySettings,
+    ArmPort, ArmState, Command, CommandSource, Device, DeviceFault, DevicePort, Placement, Pose,
+    SafetySettings,
 };
 
 use super::PATIENCE;
@@ -124,5 +126,53 @@ impl Dice {
             3 => bytes[at] ^= 1 << self.roll(8),
             _ => drop(bytes.remove(at)),
         }
+    }
+}
+
+/// The scene's axes are the device's.
+pub fn placement() -> Placement {
+    Placement::plain(Pose::identity(), Point3::origin())
+}
+
+/// A floor 20 mm below the start, with a torque that no arm can render.
+pub fn floor(pose: &Pose) -> Vector6<f64> {
+    let below = (-0.02 - pose.translation.vector.z).max(0.0);
+    Vector6::new(0.0, 0.0, 200.0 * below, 0.0, 0.4, 0.0)
+}
+
+/// An arm's wire without a port, under a virtual clock.
+pub struct Direct<A>(Arc<Mutex<Wire<A>>>);
+
+/// What is at its ends.
+pub struct Wire<A> {
+    pub arm: A,
+    pub state: ArmState,
+    pub force: [f64; 3],
+}
+
+impl<A> Direct<A> {
+    pub fn of(arm: A) -> Self {
+        let (state, force) = (ArmState::default(), [0.0; 3]);
+        Self(Arc::new(Mutex::new(Wire { arm, state, force })))
+    }
+
+    pub fn lock(&self) -> MutexGuard<'_, Wire<A>> {
+        self.0.lock().expect("not poisoned")
+    }
+}
+
+impl<A> Clone for Direct<A> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<A: Send> ArmPort for Direct<A> {
+    fn newest(&mut self) -> ArmState {
+        self.lock().state
+    }
+
+    fn push(&mut self, force: [f64; 3]) {
+        self.lock().force = force;
     }
 }
