@@ -8,6 +8,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::relay::{Impairment, Waiting};
+use crate::support::{PATIENCE, shipped_workbench};
 use clap::Parser;
 use taut::report::terminal::Terminal;
 use taut::session::Session;
@@ -15,7 +16,6 @@ use taut::session::setup::DeviceSource;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::{BridgeArgs, BridgeReport, DeviceLimits, MAX_EDGE_DELAY};
 use taut_link::{ClientOptions, Role, connect, create_key_file};
-use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 use taut_test_kit::BALL_ON_FLOOR;
 
 const STIFFNESS: f64 = 1000.0;
@@ -33,9 +33,6 @@ const RAMPED_IN: Duration = Duration::from_millis(900);
 const STALL_US: u64 = 8_000;
 /// Runs until one without a safety event.
 const ATTEMPTS: u32 = 4;
-
-/// Much longer than anything here takes; the machine may be busy.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 #[derive(Parser)]
 struct Cli {
@@ -63,18 +60,7 @@ fn run(coupling: &str) -> Run {
     let key_path = folder.path().join("key");
     let key = create_key_file(&key_path).expect("a key");
 
-    let wanted = [
-        "network.quic_port=0",
-        "network.udp_port=0",
-        "device={kind=\"remote\"}",
-    ];
-    let workbench = Workbench::parse_with_overrides(
-        "workbench.toml",
-        SHIPPED_WORKBENCH,
-        Path::new(""),
-        &wanted,
-    )
-    .unwrap_or_else(|error| panic!("{error}"));
+    let workbench = shipped_workbench(&["device={kind=\"remote\"}"]);
     let overrides = Overrides {
         scene: scene.to_str().map(str::to_owned),
         no_monitor: true,

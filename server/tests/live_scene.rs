@@ -12,7 +12,8 @@ use taut_bridge::{
 };
 use taut_link::{ClientOptions, Role, connect, read_key_file};
 
-use crate::operator::{PATIENCE, Served, TOKEN, wait_until, with_token_file};
+use crate::operator::{Served, TOKEN, with_token_file};
+use crate::support::{PATIENCE, wait_until};
 use crate::support::{Workplace, taut};
 
 /// A ball over a plate whose upper face is at 20 mm.

@@ -5,27 +5,16 @@ use std::net::{TcpStream, UdpSocket};
 use std::os::unix::net::UnixDatagram;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use crate::support::{Workplace, workbench};
+use crate::support::{PATIENCE, Workplace, wait_until, workbench};
 use taut_link::proto::control::LogLevel;
 use taut_link::{
     ClientOptions, ClusterKey, JoinKey, Role, Transport, connect, create_key_file, read_key_file,
 };
 
-/// Longer than anything takes on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(60);
-
 /// Clears a screen, sets a title, turns the direction of writing, and fakes a line.
 const HOSTILE: &str = "\u{1b}[2J\u{1b}]0;owned\u{7}\u{202e}txt.exe\r\nERROR taut: all is lost";
-
-fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
-    let begun = Instant::now();
-    while !holds() {
-        assert!(begun.elapsed() < PATIENCE, "{what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
 
 fn serve(place: &Workplace, more: &[&str], environment: &[(&str, &str)]) -> Child {
     let child = Command::new(env!("CARGO_BIN_EXE_taut"))

@@ -10,21 +10,11 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{Workplace, start, taut, workbench};
+use crate::support::{PATIENCE, Workplace, start, taut, wait_until, workbench};
 
-/// Longer than anything takes on a busy machine.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 pub(crate) const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 /// A force that is one, N.
 const FELT: f64 = 0.2;
-
-pub(crate) fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
-    let begun = Instant::now();
-    while !holds() {
-        assert!(begun.elapsed() < PATIENCE, "{what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
 
 /// The plain workbench with an operator's page, whose device a person arms.
 fn with_page() -> String {

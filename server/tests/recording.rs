@@ -11,9 +11,8 @@ use taut::session::setup::workbench::{Overrides, session_setup};
 use taut::shared::failure::Failure;
 use taut::shared::shutdown::Shutdown;
 use taut_link::ClusterKey;
-use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
-use crate::support::taut;
+use crate::support::{shipped_workbench, taut};
 
 /// How long a session runs at least: the simulated hand touches before.
 const RUN: Duration = Duration::from_millis(2500);
@@ -25,14 +24,7 @@ const ATTEMPTS: u32 = 5;
 const UPDATES: u64 = 200;
 
 fn record(scene: &str, directory: &Path) {
-    let free_ports = ["network.quic_port=0", "network.udp_port=0"];
-    let workbench = Workbench::parse_with_overrides(
-        "workbench.toml",
-        SHIPPED_WORKBENCH,
-        Path::new(""),
-        &free_ports,
-    )
-    .unwrap_or_else(|error| panic!("{error}"));
+    let workbench = shipped_workbench(&[]);
     let key = ClusterKey::generate().expect("no random numbers");
     let overrides = Overrides {
         scene: Some(scene.to_owned()),

@@ -18,7 +18,8 @@ use taut_bridge::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
 use taut_link::{
     ClientOptions, ClusterKey, ReceivedState, Role, connect, create_key_file, read_key_file,
 };
-use taut_scene::{SHIPPED_WORKBENCH, Workbench};
+
+use crate::support::shipped_workbench;
 
 /// Only a hang takes this long.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -30,14 +31,7 @@ fn setup() -> SessionSetup {
 
 fn setup_of(scene: &str, key: ClusterKey) -> SessionSetup {
     let scene = format!("scene=\"{scene}\"");
-    let free_ports = ["network.quic_port=0", "network.udp_port=0", scene.as_str()];
-    let workbench = Workbench::parse_with_overrides(
-        "workbench.toml",
-        SHIPPED_WORKBENCH,
-        Path::new(""),
-        &free_ports,
-    )
-    .unwrap_or_else(|error| panic!("{error}"));
+    let workbench = shipped_workbench(&[&scene]);
     match session_setup(
         &workbench,
         key,

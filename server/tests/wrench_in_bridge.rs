@@ -9,9 +9,9 @@ use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::{BridgeArgs, BridgeReport};
 use taut_link::create_key_file;
-use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
 use crate::relay::{Impairment, Waiting};
+use crate::support::shipped_workbench;
 use crate::wrench_in::{felt, sender};
 
 /// Only a hang takes this long.
@@ -32,19 +32,14 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
     let still = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.2,1,0,0,0\n1,0,0,0.2,1,0,0,0\n";
     std::fs::write(&path, still).expect("a file");
     let wanted = [
-        "network.quic_port=0",
-        "network.udp_port=0",
         "scene=\"sphere-on-plane\"",
         "device={kind=\"remote\"}",
         "wrench_in.enabled=true",
         // A busy machine pauses a process for longer than a network does; nobody is there to arm again.
         "safety.rearm=\"automatic\"",
         "network.node_timeout=20.0",
-    ]
-    .map(String::from);
-    let workbench =
-        Workbench::parse_with_overrides("w.toml", SHIPPED_WORKBENCH, Path::new(""), &wanted)
-            .unwrap_or_else(|error| panic!("{error}"));
+    ];
+    let workbench = shipped_workbench(&wanted);
     let overrides = Overrides {
         no_monitor: true,
         recording: Some(folder.path().join("session")),

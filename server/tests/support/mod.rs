@@ -1,9 +1,10 @@
 //! The program from outside: a directory to work in, and how it is started.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
-use taut_scene::SHIPPED_WORKBENCH;
+use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
 /// A directory with a key and a workbench on free ports.
 pub(crate) struct Workplace {
@@ -83,5 +84,28 @@ pub(crate) fn start<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Child {
     match child {
         Ok(child) => child,
         Err(error) => panic!("taut does not start: {error}"),
+    }
+}
+
+/// The shipped workbench on free ports, with these keys instead of its own.
+pub(crate) fn shipped_workbench(more: &[&str]) -> Workbench {
+    let overrides = [&["network.quic_port=0", "network.udp_port=0"], more].concat();
+    Workbench::parse_with_overrides(
+        "workbench.toml",
+        SHIPPED_WORKBENCH,
+        Path::new(""),
+        &overrides,
+    )
+    .unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Longer than anything takes on a busy machine.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+
+pub(crate) fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+    let begun = Instant::now();
+    while !holds() {
+        assert!(begun.elapsed() < PATIENCE, "{what}");
+        std::thread::sleep(Duration::from_millis(20));
     }
 }
