@@ -58,19 +58,9 @@ pub(crate) fn find_node<'a>(
     })
 }
 
-/// The stage of one node; `meshes[0]` is the god-object's, then one per obstacle. `panorama` is the light that the scene names.
-pub(crate) fn stage(
-    description: &SceneDescription,
-    node: &NodeDescription,
-    meshes: &[Arc<MeshBlob>],
-    panorama: Option<&Panorama>,
-    overrides: &Overrides,
-) -> Result<Stage, RenderError> {
+/// Refuses a scene with numbers that nothing can be drawn by.
+fn check_numbers(description: &SceneDescription) -> Result<(), RenderError> {
     let bad = |what: String| RenderError::BadScene { what };
-    let pose = |pose: &PoseF64, whose: &str| {
-        pose.to_isometry()
-            .ok_or_else(|| bad(format!("the pose of {whose} is not a rigid motion")))
-    };
     let positive = description.display_scale.is_finite() && description.display_scale > 0.0;
     if !positive {
         return Err(bad(format!(
@@ -93,6 +83,23 @@ pub(crate) fn stage(
             "its separation_scale is {scale} and its nearest_disparity {disparity} rad"
         )));
     }
+    Ok(())
+}
+
+/// The stage of one node; `meshes[0]` is the god-object's, then one per obstacle. `panorama` is the light that the scene names.
+pub(crate) fn stage(
+    description: &SceneDescription,
+    node: &NodeDescription,
+    meshes: &[Arc<MeshBlob>],
+    panorama: Option<&Panorama>,
+    overrides: &Overrides,
+) -> Result<Stage, RenderError> {
+    let bad = |what: String| RenderError::BadScene { what };
+    let pose = |pose: &PoseF64, whose: &str| {
+        pose.to_isometry()
+            .ok_or_else(|| bad(format!("the pose of {whose} is not a rigid motion")))
+    };
+    check_numbers(description)?;
     let origin = pose(&description.scene_origin, "the scene on the workbench")?;
     let drawn: Vec<(TriangleMesh, Point3<f64>)> = meshes.iter().map(|blob| mesh_of(blob)).collect();
     let body = |id, mesh: usize, described: &BodyDescription| -> Result<StageBody, RenderError> {
@@ -127,8 +134,8 @@ pub(crate) fn stage(
         head: pose(&description.viewer, "the viewer")?,
         eye_separation: description.eye_separation,
         comfort: Comfort {
-            separation_scale: scale,
-            nearest_disparity: (disparity > 0.0).then_some(disparity),
+            separation_scale: description.separation_scale,
+            nearest_disparity: Some(description.nearest_disparity).filter(|limit| *limit > 0.0),
         },
         clip_planes: ClipPlanes {
             near: description.near,

@@ -26,46 +26,7 @@ pub(crate) fn parse(text: &str, aspect: f64) -> Result<(OutputMesh, Vec<usize>),
         .enumerate()
         .map(|(index, line)| (index + 1, line.trim()))
         .filter(|(_, line)| !line.is_empty());
-    let (at, kind) = lines.next().ok_or_else(|| {
-        Unnamed::new("is empty; a mesh begins with 2, and a line with its columns and rows")
-    })?;
-    match kind {
-        "2" => {}
-        "1" => {
-            return Err(Unnamed::at(
-                at,
-                "is a polar mesh (1), which needs a fisheye picture; make a rectangular one (2)",
-            ));
-        }
-        _ => {
-            return Err(Unnamed::at(
-                at,
-                "does not begin with the number 2 of a rectangular mesh; save it in Paul Bourke's format",
-            ));
-        }
-    }
-    let (at, size) = lines.next().ok_or_else(|| {
-        Unnamed::at(
-            at,
-            "ends before its numbers of columns and rows; save it again",
-        )
-    })?;
-    let numbers: Vec<Option<usize>> = size.split_whitespace().map(|n| n.parse().ok()).collect();
-    let (columns, rows) = match numbers[..] {
-        [Some(columns), Some(rows)]
-            if columns >= 2 && rows >= 2 && columns.saturating_mul(rows) <= MAX_NODES =>
-        {
-            (columns, rows)
-        }
-        _ => {
-            return Err(Unnamed::at(
-                at,
-                format!(
-                    "must have the numbers of columns and rows, each 2 at least, {MAX_NODES} nodes in all"
-                ),
-            ));
-        }
-    };
+    let (at, columns, rows) = head(&mut lines)?;
     let count = columns * rows;
     let (mut nodes, mut places) = (Vec::new(), Vec::new()); // grow with the file, not with what it claims
     for (at, line) in lines {
@@ -95,6 +56,50 @@ pub(crate) fn parse(text: &str, aspect: f64) -> Result<(OutputMesh, Vec<usize>),
         nodes,
     };
     Ok((mesh, places))
+}
+
+/// The second line's place, and the columns and rows that it promises.
+fn head<'t>(
+    lines: &mut impl Iterator<Item = (usize, &'t str)>,
+) -> Result<(usize, usize, usize), Unnamed> {
+    let (at, kind) = lines.next().ok_or_else(|| {
+        Unnamed::new("is empty; a mesh begins with 2, and a line with its columns and rows")
+    })?;
+    match kind {
+        "2" => {}
+        "1" => {
+            return Err(Unnamed::at(
+                at,
+                "is a polar mesh (1), which needs a fisheye picture; make a rectangular one (2)",
+            ));
+        }
+        _ => {
+            return Err(Unnamed::at(
+                at,
+                "does not begin with the number 2 of a rectangular mesh; save it in Paul Bourke's format",
+            ));
+        }
+    }
+    let (at, size) = lines.next().ok_or_else(|| {
+        Unnamed::at(
+            at,
+            "ends before its numbers of columns and rows; save it again",
+        )
+    })?;
+    let numbers: Vec<Option<usize>> = size.split_whitespace().map(|n| n.parse().ok()).collect();
+    match numbers[..] {
+        [Some(columns), Some(rows)]
+            if columns >= 2 && rows >= 2 && columns.saturating_mul(rows) <= MAX_NODES =>
+        {
+            Ok((at, columns, rows))
+        }
+        _ => Err(Unnamed::at(
+            at,
+            format!(
+                "must have the numbers of columns and rows, each 2 at least, {MAX_NODES} nodes in all"
+            ),
+        )),
+    }
 }
 
 fn node(line: &str, aspect: f64) -> Result<OutputNode, String> {

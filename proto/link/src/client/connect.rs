@@ -235,11 +235,8 @@ struct Joined {
 
 /// Hello to scene, and to the coupling for a device bridge.
 async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined, LinkError> {
-    let lost = |error: ConnectionError| LinkError::Closed {
-        server: options.server.clone(),
-        reason: close_text(&error, "the server"),
-    };
-    let (mut send, mut recv) = connection.open_bi().await.map_err(lost)?;
+    let opened = connection.open_bi().await;
+    let (mut send, mut recv) = opened.map_err(|error| lost(options, &error))?;
     let binding = binding::proof_binding(connection)?;
     let (grant, secret) = options.key.secret_for(options.role, &options.node)?;
     let claim = Claim {
@@ -256,30 +253,7 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         proof: secret.client_proof(&binding, claim),
         grant,
     };
-    let hello = ControlMessage::Hello(hello);
-    if write_message(&mut send, &hello, options.versions.max())
-        .await
-        .is_err()
-    {
-        return Err(lost(connection.closed().await));
-    }
-    let welcome = match expect(options, connection, &mut recv, options.versions).await? {
-        ControlMessage::Welcome(welcome) if options.versions.contains(welcome.version) => welcome,
-        ControlMessage::Welcome(welcome) => {
-            return Err(LinkError::WrongVersion {
-                server: options.server.clone(),
-                theirs: welcome.version,
-                ours: options.versions,
-            });
-        }
-        ControlMessage::Refused(refusal) => return Err(refused(options, refusal)),
-        other => {
-            return Err(protocol(
-                options,
-                format!("it answers Hello with {}", other.name()),
-            ));
-        }
-    };
+    let welcome = greet(options, connection, hello, (&mut send, &mut recv)).await?;
     // Now the server must prove the secret, too: its certificate alone says only that it holds its own key.
     if !secret.verify_server(&welcome.proof, &binding, claim) {
         return Err(LinkError::WrongKey {
@@ -315,6 +289,44 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         send,
         recv,
     })
+}
+
+/// Says Hello and hears whether the server lets the client in.
+async fn greet(
+    options: &ClientOptions,
+    connection: &Connection,
+    hello: Hello,
+    (send, recv): (&mut SendStream, &mut RecvStream),
+) -> Result<Welcome, LinkError> {
+    let hello = ControlMessage::Hello(hello);
+    if write_message(send, &hello, options.versions.max())
+        .await
+        .is_err()
+    {
+        return Err(lost(options, &connection.closed().await));
+    }
+    match expect(options, connection, recv, options.versions).await? {
+        ControlMessage::Welcome(welcome) if options.versions.contains(welcome.version) => {
+            Ok(welcome)
+        }
+        ControlMessage::Welcome(welcome) => Err(LinkError::WrongVersion {
+            server: options.server.clone(),
+            theirs: welcome.version,
+            ours: options.versions,
+        }),
+        ControlMessage::Refused(refusal) => Err(refused(options, refusal)),
+        other => Err(protocol(
+            options,
+            format!("it answers Hello with {}", other.name()),
+        )),
+    }
+}
+
+fn lost(options: &ClientOptions, error: &ConnectionError) -> LinkError {
+    LinkError::Closed {
+        server: options.server.clone(),
+        reason: close_text(error, "the server"),
+    }
 }
 
 async fn expect(

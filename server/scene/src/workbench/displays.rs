@@ -61,39 +61,7 @@ pub(super) fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
     let mut nodes: Vec<Node> = Vec::new();
     for section in root.sections("node") {
         let name = unique_name(&section, "node", nodes.iter().map(|n| n.name.as_str()));
-        if !section.has("screens") {
-            section.complain_missing("screens", "screens = [\"front\"]");
-        }
-        let mut drawn = Vec::new();
-        for (screen, at) in section.texts("screens").unwrap_or_default() {
-            if !screens.iter().any(|known| known.name == screen) {
-                let known: Vec<&str> = screens.iter().map(|s| s.name.as_str()).collect();
-                let text = format!(
-                    "{} draws the screen \"{screen}\", which does not exist; known screens: {}",
-                    section.name(),
-                    known.join(", ")
-                );
-                section.complain(at, text);
-            } else if drawn.iter().any(|other| other == screen) {
-                section.complain(
-                    at,
-                    format!(
-                        "{} draws the screen \"{screen}\" twice; remove one",
-                        section.name()
-                    ),
-                );
-            }
-            drawn.push(screen.to_owned());
-        }
-        if let Some(list) = section.get("screens").filter(|_| drawn.is_empty()) {
-            section.complain(
-                &list.at,
-                format!(
-                    "{} draws no screen; name at least one in `screens`",
-                    section.name()
-                ),
-            );
-        }
+        let drawn = screens_of(&section, screens);
         let stereo = section.choice("stereo", &Stereo::NAMED).unwrap_or_default();
         let at = section.get("stereo").map_or(section.at(), |node| &node.at);
         let named = name.as_deref().unwrap_or_default();
@@ -102,25 +70,7 @@ pub(super) fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
                 section.complain(at, text);
             }
         }
-        let window = table(&section, "window", |window| {
-            let pixels = |key, default| {
-                window
-                    .integer(key, 16, MAX_PIXELS)
-                    .map_or(default, |n| n as u32)
-            };
-            Window {
-                width: pixels("width", 1280),
-                height: pixels("height", 800),
-                fullscreen: window.boolean("fullscreen").unwrap_or(false),
-                monitors: window.names_or_numbers("monitor").unwrap_or_default(),
-            }
-        });
-        let window = window.unwrap_or(Window {
-            width: 1280,
-            height: 800,
-            fullscreen: false,
-            monitors: Vec::new(),
-        });
+        let window = table(&section, "window", window).unwrap_or(PLAIN_WINDOW);
         section.finish();
         if let Some(name) = name {
             nodes.push(Node {
@@ -135,6 +85,66 @@ pub(super) fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
         root.complain_missing("node", "at least one [[node]] with name and screens");
     }
     nodes
+}
+
+/// The screens that a node draws, those included that do not exist: what hangs on them is not complained of again.
+fn screens_of(section: &Section<'_>, screens: &[Screen]) -> Vec<String> {
+    if !section.has("screens") {
+        section.complain_missing("screens", "screens = [\"front\"]");
+    }
+    let mut drawn = Vec::new();
+    for (screen, at) in section.texts("screens").unwrap_or_default() {
+        if !screens.iter().any(|known| known.name == screen) {
+            let known: Vec<&str> = screens.iter().map(|s| s.name.as_str()).collect();
+            let text = format!(
+                "{} draws the screen \"{screen}\", which does not exist; known screens: {}",
+                section.name(),
+                known.join(", ")
+            );
+            section.complain(at, text);
+        } else if drawn.iter().any(|other| other == screen) {
+            section.complain(
+                at,
+                format!(
+                    "{} draws the screen \"{screen}\" twice; remove one",
+                    section.name()
+                ),
+            );
+        }
+        drawn.push(screen.to_owned());
+    }
+    if let Some(list) = section.get("screens").filter(|_| drawn.is_empty()) {
+        section.complain(
+            &list.at,
+            format!(
+                "{} draws no screen; name at least one in `screens`",
+                section.name()
+            ),
+        );
+    }
+    drawn
+}
+
+/// The window of a node that says nothing of it.
+const PLAIN_WINDOW: Window = Window {
+    width: 1280,
+    height: 800,
+    fullscreen: false,
+    monitors: Vec::new(),
+};
+
+fn window(section: &Section<'_>) -> Window {
+    let pixels = |key, default| {
+        section
+            .integer(key, 16, MAX_PIXELS)
+            .map_or(default, |n| n as u32)
+    };
+    Window {
+        width: pixels("width", PLAIN_WINDOW.width),
+        height: pixels("height", PLAIN_WINDOW.height),
+        fullscreen: section.boolean("fullscreen").unwrap_or(false),
+        monitors: section.names_or_numbers("monitor").unwrap_or_default(),
+    }
 }
 
 pub(super) fn unique_name<'n>(

@@ -121,6 +121,45 @@ fn complain_of(section: &Section<'_>, machine: &Machine, others: &[Machine], nam
             ),
         );
     }
+    complain_of_nodes(section, machine, others, named);
+    if machine.device.is_some() && !matches!(named.device, Some(Device::Remote) | None) {
+        complain(
+            section,
+            "device",
+            format!(
+                "{name} has a device, but the server reads its own; write kind = \"remote\" in [device], or take `device` out here"
+            ),
+        );
+    }
+    if machine.tracker.is_some() && !matches!(named.tracking, Some(HeadTracking::Remote) | None) {
+        complain(
+            section,
+            "tracker",
+            format!(
+                "{name} has a head tracker, but [viewer] does not wait for one; write remote_tracker = true there, or take `tracker` out here"
+            ),
+        );
+    }
+    let does_nothing = !machine.server
+        && machine.nodes.is_empty()
+        && machine.device.is_none()
+        && machine.tracker.is_none();
+    if does_nothing {
+        section.complain(
+            section.at(),
+            format!("{name} does nothing; write server = true, nodes = [...], device = \"...\" or tracker = \"...\""),
+        );
+    }
+}
+
+/// What is wrong with the nodes that a machine runs.
+fn complain_of_nodes(
+    section: &Section<'_>,
+    machine: &Machine,
+    others: &[Machine],
+    named: &Named<'_>,
+) {
+    let name = &machine.name;
     for (place, node) in machine.nodes.iter().enumerate() {
         let elsewhere = others.iter().find(|other| other.nodes.contains(node));
         if !named.nodes.iter().any(|known| known.name == *node) {
@@ -149,34 +188,6 @@ fn complain_of(section: &Section<'_>, machine: &Machine, others: &[Machine], nam
                 format!("{name} names the node \"{node}\" twice; remove one"),
             );
         }
-    }
-    if machine.device.is_some() && !matches!(named.device, Some(Device::Remote) | None) {
-        complain(
-            section,
-            "device",
-            format!(
-                "{name} has a device, but the server reads its own; write kind = \"remote\" in [device], or take `device` out here"
-            ),
-        );
-    }
-    if machine.tracker.is_some() && !matches!(named.tracking, Some(HeadTracking::Remote) | None) {
-        complain(
-            section,
-            "tracker",
-            format!(
-                "{name} has a head tracker, but [viewer] does not wait for one; write remote_tracker = true there, or take `tracker` out here"
-            ),
-        );
-    }
-    let does_nothing = !machine.server
-        && machine.nodes.is_empty()
-        && machine.device.is_none()
-        && machine.tracker.is_none();
-    if does_nothing {
-        section.complain(
-            section.at(),
-            format!("{name} does nothing; write server = true, nodes = [...], device = \"...\" or tracker = \"...\""),
-        );
     }
 }
 

@@ -142,37 +142,8 @@ pub(super) fn judge(
         if !linear && !renders_torque {
             continue; // it is not rendered
         }
-        let axis = |hand: &Hand| {
-            let damped = SampledLoop {
-                delay: PERIOD_S + device.delay,
-                motor_lag: device.motor_lag,
-                virtual_damping: stiffness * settings.damping_time,
-                ..SampledLoop::at_period(PERIOD_S)
-            };
-            if linear {
-                DeclaredAxis {
-                    sampled: SampledLoop {
-                        mass: device.mass,
-                        damping: device.damping,
-                        ..damped
-                    }
-                    .held_along(hand),
-                    coulomb: device.friction,
-                    resolution: device.resolution,
-                }
-            } else {
-                DeclaredAxis {
-                    sampled: SampledLoop {
-                        mass: device.inertia,
-                        damping: device.rotational_damping,
-                        ..damped
-                    }
-                    .held_about(hand),
-                    coulomb: device.rotational_friction,
-                    resolution: device.angular_resolution,
-                }
-            }
-        };
+        let virtual_damping = stiffness * settings.damping_time;
+        let axis = |hand: &Hand| declared_axis(device, hand, virtual_damping, linear);
         let held = axis(&hand).verdict();
         let released = axis(&Hand::RELEASED).verdict();
         let above = |limit: f64| stiffness > limit * (1.0 + ROUNDING);
@@ -205,6 +176,44 @@ pub(super) fn judge(
         }
     }
     Ok(warnings)
+}
+
+/// The loop that device and hand close along an axis, or about one.
+fn declared_axis(
+    device: &DeviceDynamics,
+    hand: &Hand,
+    virtual_damping: f64,
+    linear: bool,
+) -> DeclaredAxis {
+    let damped = SampledLoop {
+        delay: PERIOD_S + device.delay,
+        motor_lag: device.motor_lag,
+        virtual_damping,
+        ..SampledLoop::at_period(PERIOD_S)
+    };
+    if linear {
+        DeclaredAxis {
+            sampled: SampledLoop {
+                mass: device.mass,
+                damping: device.damping,
+                ..damped
+            }
+            .held_along(hand),
+            coulomb: device.friction,
+            resolution: device.resolution,
+        }
+    } else {
+        DeclaredAxis {
+            sampled: SampledLoop {
+                mass: device.inertia,
+                damping: device.rotational_damping,
+                ..damped
+            }
+            .held_about(hand),
+            coulomb: device.rotational_friction,
+            resolution: device.angular_resolution,
+        }
+    }
 }
 
 /// `K_t` and `K_r`.
