@@ -173,13 +173,6 @@ impl ClockFilter {
         })
     }
 
-    /// Session time − client time as given out now, ns; `None` until locked.
-    pub fn offset_ns(&self, now: u64) -> Option<i64> {
-        plausible(now)
-            .filter(|_| self.locked)
-            .map(|now| self.offset_at(now))
-    }
-
     /// Smallest round trip of the last [`WINDOW`] exchanges, ns.
     pub fn round_trip_ns(&self) -> Option<u64> {
         let measured = self.count.min(WINDOW);

@@ -1,9 +1,8 @@
 //! One world on two screens and in two eyes: by the projection matrices, and in rendered pictures.
 
-use taut_proto::scene::Show;
 use taut_proto::scene::Stereo;
 
-use crate::support::{canvas, l_shape, peg_in_hole, state};
+use crate::support::{draw, l_shape, peg_in_hole};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -153,15 +152,6 @@ fn bar(half_extents: [f32; 3], pixels: (u32, u32), stereo: Stereo) -> Stage {
     stage.god_object.colour = [0.9, 0.22, 0.02];
     stage.obstacles.clear();
     stage
-}
-
-fn draw(stage: Stage, pose: Isometry3<f64>) -> Option<Vec<RgbaImage>> {
-    let mut canvas = canvas(stage)?;
-    canvas
-        .draw(&state(pose), Show::default(), true)
-        .expect("drawn");
-    let images = canvas.images().expect("read back");
-    Some(images.into_iter().map(|(_, image)| image).collect())
 }
 
 /// Middle of the orange in a row, weighted by how orange a pixel is: finer than a pixel.

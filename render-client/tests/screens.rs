@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use taut_proto::scene::Show;
 use taut_proto::scene::Stereo;
 
-use crate::support::{canvas, peg_in_hole, state};
+use crate::support::{draw, peg_in_hole};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Matrix3, Point3, Similarity3, Vector3};
 use taut_render::calibration::Chart;
@@ -66,15 +65,6 @@ fn correct(stage: &mut Stage, correction: Correction) {
     for screen in &mut stage.screens {
         screen.correction = Some(correction.clone());
     }
-}
-
-fn draw(stage: Stage, pose: Isometry3<f64>) -> Option<Vec<RgbaImage>> {
-    let mut canvas = canvas(stage)?;
-    canvas
-        .draw(&state(pose), Show::default(), true)
-        .expect("drawn");
-    let images = canvas.images().expect("read back");
-    Some(images.into_iter().map(|(_, image)| image).collect())
 }
 
 /// A small bright plate that faces the wall's viewer, and nothing else; the wall only.

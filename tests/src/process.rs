@@ -10,6 +10,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use crate::patience::wait_for;
+use crate::workbench::END_LIMIT;
 
 /// The end of a process by itself.
 #[derive(Debug)]
@@ -208,6 +209,18 @@ impl Process {
             stdout: read(&self.stdout),
             stderr: read(&self.stderr),
         }
+    }
+
+    /// Asks it to end as a terminal does, and gives its report.
+    ///
+    /// # Panics
+    /// When it ends with a failure, or not within [`END_LIMIT`].
+    #[must_use]
+    pub fn leave(self) -> String {
+        self.interrupt();
+        let ended = self.end(END_LIMIT);
+        assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
+        ended.stdout
     }
 
     /// Whether any process of its group is there: itself, or one that it started.

@@ -4,7 +4,6 @@ use std::path::Path;
 use std::time::Duration;
 
 use taut_tests::patience::wait_for;
-use taut_tests::process::Process;
 use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
 use toml::{Table, Value};
 
@@ -35,13 +34,6 @@ fn draws(workbench: &TestWorkbench) -> bool {
 
 fn pictures(folder: &Path) -> usize {
     std::fs::read_dir(folder).map_or(0, Iterator::count)
-}
-
-fn leave(node: Process) -> String {
-    node.interrupt();
-    let ended = node.end(END_LIMIT);
-    assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
-    ended.stdout
 }
 
 #[test]
@@ -96,7 +88,7 @@ fn nodes_follow_a_scene_that_is_edited_and_one_that_is_wrong_changes_nothing() {
     workbench.save();
     wait_for_lines(&mut server, "is taken: the force fades", 2);
     wait_for_lines(&mut server, "front joined", 3);
-    let report = leave(node);
+    let report = node.leave();
     assert!(report.contains("sessions: 3"), "{report}");
     let report = server.stop();
     assert_eq!(report["penetrations"].as_u64(), Some(0), "{report}");

@@ -90,14 +90,6 @@ fn serve_again(workbench: &TestWorkbench, name: &str, before: &Server) -> Server
     workbench.serve_as(name, &at)
 }
 
-/// Ends a node and reads its report.
-fn leave(node: Process) -> String {
-    node.interrupt();
-    let ended = node.end(END_LIMIT);
-    assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
-    ended.stdout
-}
-
 #[test]
 fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes_on_drawing() {
     let mut workbench = telling_workbench();
@@ -148,9 +140,9 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
     );
     std::thread::sleep(Duration::from_secs(1));
 
-    let report = leave(victim);
+    let report = victim.leave();
     assert_eq!(number_after(&report, "sessions: "), 2.0, "{report}");
-    let report = leave(steady);
+    let report = steady.leave();
     let gap = number_before(&report, " ms; meshes");
     println!("the other node's longest gap between two frames: {gap} ms");
     assert!(gap < UNDISTURBED_MS, "{report}");
@@ -252,7 +244,7 @@ fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_n
     );
     assert!(age > 0.0 && age <= ZERO_FORCE_MS + late + 1.0, "{report}");
     if let Some(front) = front {
-        let report = leave(front);
+        let report = front.leave();
         assert_eq!(number_after(&report, "sessions: "), 2.0, "{report}");
         print!("{report}");
     }
@@ -288,7 +280,7 @@ fn a_server_that_stops_ends_its_nodes_unless_they_are_to_stay() {
         assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
         assert_eq!(number_after(&ended.stdout, "sessions: "), 1.0);
         wait_for_lines(&mut again, ["table joined", ""], 1);
-        let report = leave(stays);
+        let report = stays.leave();
         assert_eq!(number_after(&report, "sessions: "), 2.0, "{report}");
     }
     bridge.interrupt();
@@ -340,7 +332,7 @@ fn a_node_that_starts_again_fetches_no_mesh_and_one_that_comes_to_another_scene_
     wait_for("pictures of the other scene", JOIN_LIMIT, || {
         (drawn() > before + 2).then_some(())
     });
-    let report = leave(follows);
+    let report = follows.leave();
     assert_eq!(number_after(&report, "sessions: "), 2.0, "{report}");
     assert!(
         number_before(&report, " bytes fetched") > 0.0,

@@ -1,6 +1,6 @@
 //! What a string-driven device is made of.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use crate::geometry_file::{GeometryError, read};
 use crate::{PerString, Pose, STRINGS};
@@ -125,23 +125,6 @@ impl Geometry {
             .fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Mass that one motor adds along its string, `J / r^2`, kg.
-    #[must_use]
-    pub fn string_mass(&self) -> f64 {
-        self.motor_inertia / (self.drum_radius * self.drum_radius)
-    }
-
-    /// The mass that a hand feels along a direction `n` with the grip at the centre: grip and motors,
-    /// `M + sum (u_i . n)^2 J / r^2`, kg.
-    #[must_use]
-    pub fn felt_mass(&self, direction: &Vector3<f64>) -> f64 {
-        let pull: f64 = (0..STRINGS)
-            .map(|i| (self.motors[i] - self.grips[i]).normalize().dot(direction))
-            .map(|along| along * along)
-            .sum();
-        self.grip_mass + pull * self.string_mass()
-    }
-
     /// Amplifier inputs for tensions, V; `None` where the file gives no `volts_per_newton`.
     #[must_use]
     pub fn volts(&self, tensions: &PerString) -> Option<PerString> {
@@ -198,15 +181,5 @@ mod tests {
             (geometry.half_width() - 0.069).abs() < 1e-12
                 && (geometry.arm() - 0.0225).abs() < 1e-12
         );
-    }
-
-    #[test]
-    fn motors_add_their_inertia_along_the_strings() {
-        let geometry = Geometry::shipped("wb").expect("shipped");
-        let sum: f64 = [Vector3::x(), Vector3::y(), Vector3::z()]
-            .iter()
-            .map(|axis| geometry.felt_mass(axis) - geometry.grip_mass)
-            .sum();
-        assert!((sum - 8.0 * geometry.string_mass()).abs() < 1e-12);
     }
 }

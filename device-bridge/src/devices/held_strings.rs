@@ -77,11 +77,6 @@ impl HeldStrings {
         self.plant.set_hand(hand);
     }
 
-    /// The strings: for faults, and for what they do.
-    pub fn strings_mut(&mut self) -> &mut SimulatedStrings {
-        &mut self.strings
-    }
-
     /// Where the held body truly is, world from body.
     #[must_use]
     pub fn true_pose(&self) -> Pose {

@@ -174,15 +174,6 @@ impl<H: StringHardware> SpidarDevice<H> {
         &self.encoders
     }
 
-    /// Takes another calibration, such as a corrected one of `taut_spidar::self_calibrate`. The pose may jump: only while disarmed.
-    pub fn set_encoders(&mut self, encoders: Encoders) {
-        self.encoders = encoders;
-        (self.answered, self.newest) = (None, None);
-        self.monitor.reset();
-        self.rates.reset();
-        self.suspicious = 0;
-    }
-
     /// Says what a motor does. The string of one that does not work is left out of the pose.
     pub fn set_motor(&mut self, string: usize, state: MotorState) {
         (self.answered, self.newest) = (None, None);

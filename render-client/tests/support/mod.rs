@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
-use taut_proto::scene::Stereo;
+use taut_proto::scene::{Show, Stereo};
 use taut_render::canvas::Canvas;
 use taut_render::comfort::Comfort;
 use taut_render::environment::Environment;
@@ -137,4 +138,14 @@ pub(crate) fn canvas(stage: Stage) -> Option<Canvas> {
             None
         }
     }
+}
+
+/// The pictures of a stage with the body at `pose`; `None` where there is nothing to draw with.
+pub(crate) fn draw(stage: Stage, pose: Isometry3<f64>) -> Option<Vec<RgbaImage>> {
+    let mut canvas = canvas(stage)?;
+    canvas
+        .draw(&state(pose), Show::default(), true)
+        .expect("drawn");
+    let images = canvas.images().expect("read back");
+    Some(images.into_iter().map(|(_, image)| image).collect())
 }

@@ -143,12 +143,6 @@ impl Monitor {
         self.log.log(level, text);
     }
 
-    /// A handle with which other threads log.
-    #[must_use]
-    pub fn logger(&self) -> MonitorLog {
-        self.log.clone()
-    }
-
     /// What was shown and dropped so far.
     #[must_use]
     pub fn stats(&self) -> MonitorStats {

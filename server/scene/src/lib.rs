@@ -63,5 +63,3 @@ pub use workbench::{
 pub type SceneError = FileError;
 /// Why a trace could not be used.
 pub type TraceFileError = FileError;
-/// Why a workbench file could not be used.
-pub type WorkbenchError = FileError;

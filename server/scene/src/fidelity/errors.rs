@@ -50,12 +50,6 @@ pub fn longest_lag(k_s: f64, rate: f64) -> f64 {
     (k_s.recip() + 1.0) / rate
 }
 
-/// Least that it is behind while a set is used, s: 1 / (k_s f).
-#[must_use]
-pub fn shortest_lag(k_s: f64, rate: f64) -> f64 {
-    (k_s * rate).recip()
-}
-
 /// Turn of a normal along a way, rad.
 #[must_use]
 pub fn normal_turn(curvature: f64, way: f64) -> f64 {
@@ -121,12 +115,6 @@ pub fn facet_angle(error: f64, curvature: f64) -> f64 {
     2.0 * (1.0 - error * curvature).clamp(-1.0, 1.0).acos()
 }
 
-/// The error at which facets of a circle meet at this angle, m: the inverse of [`facet_angle`].
-#[must_use]
-pub fn facet_error(angle: f64, curvature: f64) -> f64 {
-    (1.0 - (0.5 * angle).cos()) / curvature
-}
-
 /// How far behind an obstacle that moves its row is, m: the period that its set took, and half the time between two forces until one sees it.
 #[must_use]
 pub fn obstacle_lag(speed: f64, rate: f64) -> f64 {
@@ -177,7 +165,6 @@ mod tests {
             // At the end of the use of `last`, the newest update has its period behind it.
             let end_of_use = 200.0 / rate;
             assert!((end_of_use - last - longest_lag(k_s, rate)).abs() < 1e-9);
-            assert!((end_of_use - rate.recip() - last - shortest_lag(k_s, rate)).abs() < 1e-9);
         }
     }
 
@@ -268,7 +255,6 @@ mod tests {
         let middle = 0.5 * (Vector2::new(1.0, 0.0) + Vector2::new(angle.cos(), angle.sin()));
         let error = radius * (1.0 - middle.norm());
         assert!((facet_angle(error, 1.0 / radius) - angle).abs() < 1e-9);
-        assert!((facet_error(angle, 1.0 / radius) - error).abs() < 1e-12);
         // 39 sides: half of 18.4 degrees.
         assert!(direction_jnd(std::f64::consts::TAU / 39.0) < 0.51);
     }
