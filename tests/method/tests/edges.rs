@@ -1,12 +1,12 @@
 //! Where a surface bends or ends: stale constraints cost at most what theory says.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_4, PI};
 use std::sync::Arc;
 
 use god_object::collision::{CollisionWorkspace, Work};
 use god_object::constraint::collect_contacts;
-use god_object::{Coupling, GodObject, Pose, Settings, World};
-use nalgebra::Vector3;
+use god_object::{Coupling, GodObject, Mesh, Pose, Settings, World};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use taut_method_tests::solids::{body, cells, mesh, obstacle};
 use taut_scene::shapes::{Axis, cuboid, cylinder, sphere};
 
@@ -132,6 +132,58 @@ fn a_fast_hand_on_a_cylinder_lags_by_no_more_than_its_staleness_at_71_hertz() {
     }
 }
 
+/// A block along x whose ridge has a notch in its middle, `depth` deep, and bends there by `aside`; in halves of its length.
+fn notched_ridge(length: f64, depth: f64, aside: f64) -> Mesh {
+    let mut vertices = Vec::new();
+    for (x, y, z) in [(-1.0, 0.0, 0.0), (0.0, aside, -depth), (1.0, 0.0, 0.0)] {
+        for (y, z) in [(-1.0, -1.0), (1.0, -1.0), (y, z)] {
+            vertices.push(Point3::new(x, y, z) * (0.5 * length));
+        }
+    }
+    let mut triangles = vec![[0, 2, 1], [6, 7, 8]];
+    for at in [0, 3] {
+        for [a, b] in [[0, 1], [1, 2], [2, 0]] {
+            let [a, b, c, d] = [at + a, at + b, at + b + 3, at + a + 3];
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    Mesh::new(vertices, triangles).expect("a closed block")
+}
+
+/// A bar in the notch is held by both halves of the ridge. Where it knew one at a time it went to and fro between them, five to seven times.
+#[test]
+fn a_bar_across_a_bent_ridge_comes_to_rest_in_its_notch_at_once() {
+    let size = 0.1;
+    let bar = cuboid([0.1 * size, 0.4 * size, 0.1 * size]);
+    let settings = Settings::for_size(size);
+    for (aside, tilt) in [(0.0, 0.0), (0.1, 0.2), (0.3, 0.0), (0.3, -0.2), (0.5, 0.2)] {
+        let world = Arc::new(World {
+            body: body(mesh(bar.clone())),
+            obstacles: vec![obstacle(
+                "ridge",
+                notched_ridge(size, 0.05, aside),
+                Pose::identity(),
+            )],
+        });
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * tilt)
+            * UnitQuaternion::from_scaled_axis(Vector3::y() * FRAC_PI_4);
+        let at = |x: f64, z: f64| {
+            Pose::from_parts(Vector3::new(x, 0.5 * aside * size, z * size).into(), turn)
+        };
+        let start = at(-0.2 * size, 0.16);
+        let mut god_object = GodObject::new(world, settings, start).expect("a free start");
+        // Down on an edge in 100 ms, then along the ridge.
+        for k in 0..1000 {
+            let time = f64::from(k) * 1e-3;
+            let along = 0.4 * size * ((time - 0.1).max(0.0) / 0.9);
+            let down = 0.05 * (time / 0.1).min(1.0);
+            let report = god_object.step(&at(along - 0.2 * size, 0.16 - down), None);
+            let case = format!("aside {aside}, tilt {tilt}, {k} ms: {report:?}");
+            assert!(report.substeps <= 3 && !report.unfinished, "{case}");
+        }
+    }
+}
+
 /// Combs of eleven teeth, 4 mm apart, 2 mm wide, 10 mm deep.
 #[test]
 fn combs_lock_after_their_clearance_whatever_the_number_of_contacts() {
@@ -158,7 +210,7 @@ fn combs_lock_after_their_clearance_whatever_the_number_of_contacts() {
         }));
         let mut held = body(upper);
         // In the middle of the teeth: a push to the side has no lever.
-        held.reference_point = nalgebra::Point3::new(0.0, 0.0, -0.5 * depth);
+        held.reference_point = Point3::new(0.0, 0.0, -0.5 * depth);
         let world = Arc::new(World {
             body: held,
             obstacles: vec![obstacle("comb", lower, Pose::identity())],

@@ -169,13 +169,17 @@ impl Facing<'_> {
             && is_in_edge_cone(self.body, edge_a, &into_body, tolerance)
             && (inside[0] || {
                 let end = self.body.triangles()[pair.a as usize][(i + usize::from(s > 0.5)) % 3];
-                let way = self.placement.rotation.tr_mul(&(u * past_end(s)));
+                let [way, across] =
+                    [u * past_end(s), v].map(|d| self.placement.rotation.tr_mul(&d));
                 reentrant::covers_way(self.body, end, &way)
+                    || reentrant::covers_outline(self.body, end, &way, &across)
             })
             && (inside[1] || {
                 let end =
                     self.obstacle.triangles()[pair.b as usize][(j + usize::from(t > 0.5)) % 3];
-                reentrant::covers_way(self.obstacle, end, &(v * past_end(t)))
+                let way = v * past_end(t);
+                reentrant::covers_way(self.obstacle, end, &way)
+                    || reentrant::covers_outline(self.obstacle, end, &way, &u)
             });
         facing.then(|| {
             self.contact(
@@ -437,7 +441,7 @@ pub(crate) fn is_in_edge_cone(
 
 /// Sum of the normals at an edge: a direction inside its normal cone.
 #[inline]
-fn outward_of_edge(mesh: &Mesh, edge: u32) -> Vector3<f64> {
+pub(super) fn outward_of_edge(mesh: &Mesh, edge: u32) -> Vector3<f64> {
     let [left, right] = mesh.edges()[edge as usize].faces;
     mesh.face_normal(left) + mesh.face_normal(right)
 }

@@ -12,6 +12,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::facing::{NORMAL_CONE_TOLERANCE, is_in_edge_cone, outward_of_edge};
 use crate::geometry::Mesh;
 
 /// Most faces at a vertex that are looked at: beyond, it is no notch.
@@ -44,6 +45,39 @@ pub(super) fn covers_way(mesh: &Mesh, v: u32, way: &Vector3<f64>) -> bool {
         height_over(&a, &b, way, &outward)
     });
     height.is_some_and(|height| height >= -ROUNDING * way.norm())
+}
+
+/// Whether the straight way that goes on from vertex `v` lies under another convex edge at `v`, seen along `across`, the edge of the other mesh that it
+/// meets. Whatever is above that edge, as a line along `across`, is above the way, too: there are two edges to a notch of the outline, though a face
+/// between them may lie below both. Mesh's frame.
+pub(super) fn covers_outline(
+    mesh: &Mesh,
+    v: u32,
+    way: &Vector3<f64>,
+    across: &Vector3<f64>,
+) -> bool {
+    let apex = mesh.vertices()[v as usize];
+    let covered = for_faces(mesh, v, |face, k| {
+        let before = (k + 2) % 3;
+        let side = mesh.triangle_edges(face)[before];
+        if !mesh.edges()[side as usize].is_convex() {
+            return None;
+        }
+        let on = mesh.corners(face)[before] - apex;
+        let cross = across.cross(&on);
+        let normal = if cross.dot(&outward_of_edge(mesh, side)) < 0.0 {
+            -cross
+        } else {
+            cross
+        };
+        let aside = normal.cross(across);
+        let share = aside.dot(way) / aside.dot(&on);
+        let under = share > 0.0 && share <= 1.0 && normal.dot(way) <= 0.0; // false for NaN
+        let outlines =
+            under && is_in_edge_cone(mesh, side, &(normal / normal.norm()), NORMAL_CONE_TOLERANCE);
+        outlines.then_some(())
+    });
+    covered.is_some()
 }
 
 /// The first that `each` finds at a face at vertex `v`, by the face and which of its corners that is; the side from the corner before leads on.
@@ -135,13 +169,18 @@ pub(super) mod tests {
 
     /// A block whose upper edge has a notch in its middle: two gables that lean on each other.
     pub(in crate::constraint) fn notched(depth: f64) -> Mesh {
-        // A prism along x with a ridge at y = 0, its middle lower by `depth`.
+        bent(depth, 0.0)
+    }
+
+    /// The same with a bend to the side at the notch.
+    fn bent(depth: f64, aside: f64) -> Mesh {
+        // A prism along x with a ridge at y = 0, its middle lower by `depth` and at y = `aside`.
         let mut vertices = Vec::new();
-        for (x, drop) in [(-1.0, 0.0), (0.0, depth), (1.0, 0.0)] {
+        for (x, drop, y) in [(-1.0, 0.0, 0.0), (0.0, depth, aside), (1.0, 0.0, 0.0)] {
             vertices.extend([
                 Point3::new(x, -1.0, -1.0),
                 Point3::new(x, 1.0, -1.0),
-                Point3::new(x, 0.0, -drop),
+                Point3::new(x, y, -drop),
             ]);
         }
         let mut triangles = vec![[0, 2, 1], [6, 7, 8]];
@@ -195,6 +234,24 @@ pub(super) mod tests {
         let long = Vector3::new(1.5, 0.0, -0.15);
         assert!(!covers_way(&notched(0.1), 5, &long), "too far");
         assert!(!covers_way(&notched(0.1), 5, &Vector3::repeat(f64::NAN)));
+    }
+
+    /// Where the ridge bends, the way goes on over a flank, and a bar across the ridge is held by the other half before it gets there.
+    #[test]
+    fn a_way_over_a_bent_notch_is_covered_for_what_lies_across_both_its_edges() {
+        for (depth, expected) in [(0.1, true), (-0.1, false)] {
+            let mesh = bent(depth, 0.3);
+            for back in [1.0, -1.0] {
+                let way = Vector3::new(0.1 * back, 0.03, -0.1 * depth);
+                assert!(!covers_way(&mesh, 5, &way), "{depth}, {back}");
+                for across in [Vector3::y(), -Vector3::y(), Vector3::new(0.2, 1.0, 0.0)] {
+                    let covered = covers_outline(&mesh, 5, &way, &across);
+                    assert_eq!(covered, expected, "{depth}, {back}, {across}");
+                }
+            }
+        }
+        let nan = Vector3::repeat(f64::NAN);
+        assert!(!covers_outline(&bent(0.1, 0.3), 5, &nan, &Vector3::y()));
     }
 
     /// An edge that bounds a flat top goes on in that top, which neither rises nor falls.
