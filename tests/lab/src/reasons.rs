@@ -41,29 +41,33 @@ pub fn write(scores: &[Score], directory: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The lines that have a column of their own, those most missed first, and the others.
-fn lines(scores: &[Score]) -> (Vec<&'static str>, Vec<&'static str>) {
+/// A column of the picture: its name, and the lines that it counts.
+type Column = (String, Vec<&'static str>);
+
+/// A column for each line that somebody missed often, those most missed first, and one for the others.
+fn columns(scores: &[Score]) -> Vec<Column> {
     let names: BTreeSet<_> = (scores.iter().flat_map(Score::reasons))
         .map(|reason| reason.0)
         .collect();
-    let misses = |line| scores.iter().map(|s| missed(s, line)).sum::<usize>();
+    let misses = |line| scores.iter().map(|s| missed(s, &[line])).sum::<usize>();
     let mut lines: Vec<_> = names.into_iter().collect();
     lines.sort_by_key(|line| std::cmp::Reverse(misses(line))); // stable: by name
-    lines
+    let (own, others): (Vec<_>, Vec<_>) = lines
         .into_iter()
-        .partition(|line| scores.iter().any(|s| missed(s, line) >= OWN_COLUMN))
+        .partition(|line| scores.iter().any(|s| missed(s, &[line]) >= OWN_COLUMN));
+    let own = own.into_iter().map(|line| (line.to_owned(), vec![line]));
+    let others = (!others.is_empty()).then_some(("any_other_line".to_owned(), others));
+    own.chain(others).collect()
 }
 
-fn missed(score: &Score, line: &str) -> usize {
-    score
-        .cases
-        .values()
-        .filter(|lines| lines.contains(line))
-        .count()
+/// Cases in which one of these lines was missed.
+fn missed(score: &Score, lines: &[&str]) -> usize {
+    let misses = |case: &&BTreeSet<&str>| lines.iter().any(|line| case.contains(line));
+    score.cases.values().filter(misses).count()
 }
 
 fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
-    let (lines, others) = lines(scores);
+    let columns = columns(scores);
     let of_rate = |rate: u32| scores.iter().filter(move |score| score.rate == rate);
     let rates: Vec<u32> = RATES
         .into_iter()
@@ -71,7 +75,7 @@ fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
         .filter(|rate| of_rate(*rate).next().is_some())
         .collect();
     let height = HEAD + FOOT + scores.len() as i32 * CELL.1 + rates.len() as i32 * GAP;
-    let width = NAMES + (lines.len() as i32 + 2) * CELL.0 + 40;
+    let width = NAMES + (columns.len() as i32 + 1) * CELL.0 + 40;
     let mut text = String::new();
     let root =
         SVGBackend::with_string(&mut text, (width as u32, height as u32)).into_drawing_area();
@@ -96,9 +100,9 @@ fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
     )?;
     let column = |index: usize| NAMES + index as i32 * CELL.0;
     write("within", (column(0) + 8, HEAD - 18), 13)?;
-    for (index, line) in lines.iter().enumerate() {
+    for (index, (name, _)) in columns.iter().enumerate() {
         // Names of two or three words stand in as many lines.
-        for (word, part) in line.split('_').enumerate() {
+        for (word, part) in name.split('_').enumerate() {
             let place = (column(index + 1) + 4, 62 + 14 * word as i32);
             root.draw(&Text::new(part.to_owned(), place, ("sans-serif", 13)))?;
         }
@@ -110,7 +114,7 @@ fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
             write(score.method.name(), (28, y + 4), 14)?;
             let all = score.cases.len().max(1);
             let within = score.within() as f64 / all as f64;
-            let counts = lines.iter().map(|line| missed(score, line));
+            let counts = columns.iter().map(|(_, lines)| missed(score, lines));
             let cells = std::iter::once((
                 score.within(),
                 colour(score.method).mix(0.15 + 0.5 * within),
@@ -142,38 +146,47 @@ mod tests {
 
     #[test]
     fn each_line_that_was_missed_has_a_column_and_each_score_a_row() {
-        let case = |name: &str, lines: &[&'static str]| {
-            (
-                (name.to_owned(), String::new()),
-                lines.iter().copied().collect(),
-            )
+        let cases = |of: [&[&'static str]; 3]| {
+            let of_case = |(at, lines): (usize, &&[&'static str])| {
+                (
+                    (format!("R{at}"), String::new()),
+                    lines.iter().copied().collect(),
+                )
+            };
+            BTreeMap::from_iter(of.iter().enumerate().map(of_case))
         };
         let score = |method, cases| Score {
             method,
             rate: 1000,
             held: 1000.0,
-            cases: BTreeMap::from(cases),
+            cases,
         };
         let scores = [
-            score(Method::Ours, [case("R01", &[]), case("R02", &["step"])]),
+            score(Method::Ours, cases([&[], &["step"], &[]])),
             score(
                 Method::Penalty,
-                [
-                    case("R01", &["penetration", "step"]),
-                    case("R02", &["step"]),
-                ],
+                cases([
+                    &["penetration", "step"],
+                    &["step", "torque"],
+                    &["step", "torque"],
+                ]),
             ),
         ];
-        assert_eq!(lines(&scores), ["step", "penetration"]);
+        let expected = [("step", 3), ("any_other_line", 3)];
+        let found = columns(&scores);
+        let found = found
+            .iter()
+            .map(|(name, lines)| (name.as_str(), missed(&scores[1], lines)));
+        assert!(found.eq(expected));
         let folder = tempfile::tempdir().expect("a folder");
         write(&scores, folder.path()).expect("written");
         let read = |name| std::fs::read_to_string(folder.path().join(name)).expect("it is there");
         assert_eq!(
             read("reasons.csv"),
-            "method,rate_hz,cases,within,line,missed\nours,1000,2,1,step,1\npenalty,1000,2,0,step,2\npenalty,1000,2,0,penetration,1\n"
+            "method,rate_hz,cases,within,line,missed\nours,1000,3,2,step,1\npenalty,1000,3,0,step,3\npenalty,1000,3,0,torque,2\npenalty,1000,3,0,penetration,1\n"
         );
         let svg = read("reasons.svg");
-        for name in ["penetration", "step", "ours", "penalty", "1000 Hz"] {
+        for name in ["other", "step", "ours", "penalty", "1000 Hz"] {
             assert!(svg.contains(name), "{name}");
         }
     }

@@ -1,6 +1,7 @@
 //! What a session refuses of files that read well: asked when it is set up, and by `taut check` before.
 
-use taut_bridge::{InputChoice, offer_of};
+use taut_bridge::InputChoice;
+use taut_bridge::edge::offer_of;
 use taut_link::proto::{CouplingOffer, EncodeError};
 use taut_link::{ClusterKey, read_key_file};
 use taut_scene::{BuiltScene, Device, DeviceDynamics, Workbench};
