@@ -173,7 +173,7 @@ mod tests {
     /// A session logs them when it starts; whoever checks before wants to know, too.
     #[test]
     fn what_a_session_warns_of_is_a_note() {
-        let stiff = format!("{SCENE}[coupling]\nk_h = 2000.0\n");
+        let stiff = format!("{SCENE}[coupling]\nk_h = 4000.0\n");
         let (problems, notes) = report(&stiff, &[NAMES_SCENE]);
         assert_eq!(problems, [""; 0]);
         assert!(

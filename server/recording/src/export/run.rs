@@ -128,16 +128,17 @@ fn about(manifest: &Manifest, report: &ExportReport) -> Metadata {
 
 /// A record that has a place in time.
 trait Timed {
-    fn time(&self) -> Duration;
+    /// Its place among the others.
+    fn at(&self) -> Duration;
 
     /// Of all times in it.
     fn latest(&self) -> Duration {
-        self.time()
+        self.at()
     }
 }
 
 impl Timed for HapticsRecord {
-    fn time(&self) -> Duration {
+    fn at(&self) -> Duration {
         self.tick
     }
 
@@ -147,13 +148,13 @@ impl Timed for HapticsRecord {
 }
 
 impl Timed for UpdateRecord {
-    fn time(&self) -> Duration {
+    fn at(&self) -> Duration {
         self.published
     }
 }
 
 impl Timed for ForceRecord {
-    fn time(&self) -> Duration {
+    fn at(&self) -> Duration {
         self.time
     }
 }
@@ -211,7 +212,7 @@ impl<T: Parse + Timed> WholeRecords<T> {
     }
 
     fn time(&self) -> Option<Duration> {
-        self.next.as_ref().map(Timed::time)
+        self.next.as_ref().map(Timed::at)
     }
 
     fn take(&mut self) -> Option<T> {
