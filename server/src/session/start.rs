@@ -25,7 +25,7 @@ use crate::session::observers::ObserverServices;
 use crate::session::operator::{Continuity, Facts, OperatorPage};
 use crate::session::setup::content::own_colours;
 use crate::session::setup::{
-    DeviceSource, LinkSettings, RecordingSettings, SessionSetup, untravelled,
+    DeviceSource, LinkSettings, RecordingSettings, SessionSetup, unencodable,
 };
 use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
@@ -248,7 +248,7 @@ fn coupling_offer(setup: &SessionSetup) -> Result<CouplingOffer, Failure> {
     match &setup.device {
         DeviceSource::Remote { .. } => {
             let sets_hz = setup.realtime.broadcast_period.as_secs_f64().recip();
-            offer_of(&setup.world, &setup.settings, sets_hz).map_err(untravelled)
+            offer_of(&setup.world, &setup.settings, sets_hz).map_err(unencodable)
         }
         DeviceSource::Local(_) => Ok(CouplingOffer::AtServer {
             reason: "its workbench has a device of its own".into(),

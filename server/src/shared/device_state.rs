@@ -31,7 +31,7 @@ pub struct DeviceState {
     pub buttons: u16,
     /// The device does not answer; the pose is the last good one.
     pub faulty: bool,
-    /// What the hand feels from `time` on, where a bridge tells it; `None` where it is the haptics loop's wrench.
+    /// What the hand feels: as a bridge tells it, else what the port rendered last; `None` before the first tick.
     pub felt: Option<Felt>,
     /// What the port did in the tick before.
     pub safety: SafetyState,

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
-pub(in crate::session) use refusals::untravelled;
+pub(in crate::session) use refusals::unencodable;
 pub use refusals::{Refusal, refusals};
 use taut_bridge::{Device, DeviceLimits, ExternalWrenchSettings, SafetySettings};
 use taut_link::proto::barrier::MasterSettings;

@@ -63,8 +63,8 @@ pub fn refusals(workbench: &Workbench) -> (Vec<Refusal>, Vec<String>) {
         external(workbench, &overrides, &placed).map(drop),
     );
     note("scene", "", few_motions(&built));
-    let travels = travels(&built, workbench, &overrides);
-    note("scene", "", travels.map(|told| warnings.extend(told)));
+    let offered = where_coupled(&built, workbench, &overrides);
+    note("scene", "", offered.map(|told| warnings.extend(told)));
     let choice = driver(workbench, &overrides);
     match choice.and_then(|choice| dynamics_of(workbench, &overrides, choice.as_ref(), &built)) {
         Ok(declared) => {
@@ -81,7 +81,7 @@ pub fn refusals(workbench: &Workbench) -> (Vec<Refusal>, Vec<String>) {
     (found, warnings)
 }
 
-/// Refuses the cluster key as a token: a token travels in a browser's address, over plain HTTP.
+/// Refuses the cluster key as a token: a token goes in a browser's address, over plain HTTP.
 pub(super) fn no_token_is_the_key(workbench: &Workbench, key: &ClusterKey) -> Result<(), Failure> {
     for (table, token) in [
         ("operator", operator_token(workbench)),
@@ -114,12 +114,12 @@ pub(super) fn few_motions(built: &BuiltScene) -> Result<(), Failure> {
 const SETS_HZ: f64 = 1000.0;
 
 /// Refuses a number that no program of the cluster takes from another; a warning where the force of a device behind a network is computed here.
-pub(super) fn travels(
+pub(super) fn where_coupled(
     built: &BuiltScene,
     workbench: &Workbench,
     overrides: &Overrides,
 ) -> Result<Option<String>, Failure> {
-    let offer = offer_of(&built.world, &built.settings, SETS_HZ).map_err(untravelled)?;
+    let offer = offer_of(&built.world, &built.settings, SETS_HZ).map_err(unencodable)?;
     let is_remote = overrides.input.is_none() && workbench.device == Device::Remote;
     Ok(match offer {
         CouplingOffer::AtServer { reason } if is_remote => Some(format!(
@@ -129,7 +129,7 @@ pub(super) fn travels(
     })
 }
 
-pub(in crate::session) fn untravelled(error: EncodeError) -> Failure {
+pub(in crate::session) fn unencodable(error: EncodeError) -> Failure {
     Failure::BadInput(format!(
         "the scene has a number that no program takes from another: {error} (docs/numbers.md)"
     ))

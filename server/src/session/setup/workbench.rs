@@ -27,7 +27,7 @@ use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
 use crate::session::setup::devices::{device, input};
 use crate::session::setup::refusals::{
-    borne, dynamics_of, few_motions, no_token_is_the_key, travels,
+    borne, dynamics_of, few_motions, no_token_is_the_key, where_coupled,
 };
 use crate::session::setup::stability::stiffnesses;
 use crate::session::setup::{
@@ -87,7 +87,7 @@ pub fn session_setup(
     let choice = driver(workbench, overrides)?;
     let declared = dynamics_of(workbench, overrides, choice.as_ref(), &built)?;
     let mut warnings = borne(declared, &built, overrides.allow_unstable)?;
-    warnings.extend(travels(&built, workbench, overrides)?);
+    warnings.extend(where_coupled(&built, workbench, overrides)?);
     for warning in warnings {
         tracing::warn!("{warning}");
     }
