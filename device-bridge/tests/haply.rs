@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::support::floor::{Dice, OnFloor, ms, wait_until};
+use crate::support::stage::{HANGS, Inside, UNPLUGGED, VICE, no_write_jumps, pressed_from};
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3, Vector6};
 use taut_bridge::haply::{
     Exchange, ExchangeSettings, HaplyService, ServiceAddress, SimulatedInverse, SimulatedSettings,
@@ -87,6 +88,42 @@ fn a_wall_is_felt_through_the_wire_and_again_after_every_outage() {
 
     drop(held);
     wait_until("a force stayed", || service.totals().force == 0.0);
+}
+
+/// A service that is mute or without its arm for a while. What it was told while it was mute it forgets.
+struct Sometimes(HaplyService);
+
+impl Inside for Sometimes {
+    fn get(&self, name: &str) -> i64 {
+        let totals = self.0.totals();
+        match name {
+            "force" => (totals.force * 1e6) as i64,
+            "jump" => (totals.largest_jump * 1e6) as i64,
+            "writes" => totals.messages as i64,
+            "served" => 1,
+            other => panic!("{other}"),
+        }
+    }
+
+    fn set(&self, name: &str, value: i64) {
+        if name == "mode" {
+            self.0.set_mute(value == HANGS);
+            self.0.set_plugged(value != UNPLUGGED);
+        }
+    }
+}
+
+#[test]
+fn no_message_to_the_arm_jumps() {
+    let any = "127.0.0.1:0".parse().expect("an address");
+    let held = SimulatedSettings {
+        path: Some(pressed_from(Vector3::new(0.0, -0.1, 0.16), -Vector3::z())),
+        ..SimulatedSettings::held(VICE)
+    };
+    let service = HaplyService::start(any, SimulatedInverse::new(&held)).expect("a free port");
+    let choice = format!("haply={}", service.address());
+    // A driver that waits for an answer writes nothing.
+    no_write_jumps(&choice, &Sometimes(service), &[HANGS, UNPLUGGED], ms(5));
 }
 
 #[test]

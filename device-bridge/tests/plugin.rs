@@ -15,8 +15,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use taut_bridge::{Device, Rearm};
 
 use crate::support::stage::{
-    GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, PATIENCE,
-    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, ms, no_write_jumps, opened,
+    BAD_SAMPLES, GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW,
+    PATIENCE, Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, ms, no_write_jumps, opened,
 };
 
 fn here() -> &'static Path {
@@ -147,7 +147,8 @@ fn no_write_of_a_plug_in_jumps() {
     let folder = tempfile::tempdir().expect("a folder");
     let library = stand_in(folder.path(), "hand.c", "HAND");
     let inside = Loaded::of(&library);
-    no_write_jumps(&format!("plugin:{}", library.display()), &inside);
+    let choice = format!("plugin:{}", library.display());
+    no_write_jumps(&choice, &inside, &BAD_SAMPLES, PATIENCE);
 }
 
 #[test]

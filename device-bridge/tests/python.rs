@@ -10,8 +10,8 @@ use taut_bridge::{DeviceFault, Rearm};
 use tempfile::TempDir;
 
 use crate::support::stage::{
-    GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, PATIENCE,
-    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, no_write_jumps, opened,
+    BAD_SAMPLES, GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW,
+    PATIENCE, Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, no_write_jumps, opened,
 };
 
 // Of tests/python/hand.py.
@@ -185,7 +185,7 @@ fn a_force_does_not_outlive_the_loop_that_wrote_it_nor_the_bridge() {
 #[test]
 fn no_write_of_a_device_in_python_jumps() {
     let inside = Shared::new();
-    no_write_jumps(&inside.choice, &inside);
+    no_write_jumps(&inside.choice, &inside, &BAD_SAMPLES, PATIENCE);
 }
 
 #[test]

@@ -4,15 +4,19 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::support::faulty::Faulty;
 use crate::support::floor::{Dice, OnFloor, ms};
-use nalgebra::{Isometry3, Point3, Vector6};
+use crate::support::stage::{HANGS, NOT_A_NUMBER, VICE, no_write_jumps, pressed_from};
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::{BoardInfo, Counters, Cycle, SimulatedBoards};
 use taut_bridge::{
     DeviceChoice, Hand, InputChoice, MinJerkPath, Placement, Pose, SpidarDevice, SpidarPlacement,
     ViaPoint, string_geometry,
 };
-use taut_spidar::{Geometry, PerString, Reading, STRINGS, StringFault, StringHardware};
+use taut_spidar::{
+    Geometry, PerString, Reading, STRINGS, StringFault, StringHardware, StringMatrix,
+};
 
 fn geometry() -> Geometry {
     string_geometry("g6x4r").expect("shipped")
@@ -84,6 +88,26 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
         drop(held);
         assert_eq!(currents(), [0; STRINGS], "a current stayed");
     }
+}
+
+#[test]
+fn no_cycle_of_the_boards_jumps() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let link = folder.path().join("boards");
+    // The frame's y is the workbench's z.
+    let path = pressed_from(Vector3::zeros(), -Vector3::y());
+    let boards = SimulatedBoards::new(&geometry(), VICE, Some(path), None, false, [0; STRINGS]);
+    let line = Faulty::of(boards.expect("volts are known"), |boards| {
+        let (cycles, digits) = (boards.cycles() / 2, *boards.digits());
+        let volts = geometry().volts(&[1.0; STRINGS]).expect("known");
+        let tensions: PerString =
+            std::array::from_fn(|i| f64::from(digits[i]) / (volts[i] * 4096.0 / 3.3));
+        let strings = StringMatrix::at(&geometry(), &boards.held().true_pose());
+        (cycles, strings.wrench(&tensions).fixed_rows::<3>(0).into())
+    });
+    let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
+    let choice = format!("spidar:{}", link.display());
+    no_write_jumps(&choice, &line, &[HANGS, NOT_A_NUMBER], ms(30));
 }
 
 #[test]

@@ -16,8 +16,10 @@ pub(crate) struct HeldArm {
     begin: Plant,
     epoch: Option<Duration>,
     elapsed: Duration,
-    commanded: Duration,
+    /// The last command, N, and when it came.
+    commanded: (Vector3<f64>, Duration),
     largest_force: f64,
+    largest_jump: f64,
 }
 
 impl HeldArm {
@@ -32,8 +34,9 @@ impl HeldArm {
             plant,
             epoch: None,
             elapsed: Duration::ZERO,
-            commanded: Duration::ZERO,
+            commanded: (Vector3::zeros(), Duration::ZERO),
             largest_force: 0.0,
+            largest_jump: 0.0,
         }
     }
 
@@ -52,9 +55,23 @@ impl HeldArm {
         self.largest_force
     }
 
+    /// The force that was commanded last, N.
+    pub(crate) fn commanded(&self) -> Vector3<f64> {
+        self.commanded.0
+    }
+
+    /// Largest change from one command to the next so far, N; one to zero is none.
+    pub(crate) fn largest_jump(&self) -> f64 {
+        self.largest_jump
+    }
+
     /// The motors take a force, N.
     pub(crate) fn push(&mut self, now: Duration, force: &Vector3<f64>) {
-        self.commanded = now;
+        if *force != Vector3::zeros() {
+            let change = (force - self.commanded.0).norm();
+            self.largest_jump = self.largest_jump.max(change);
+        }
+        self.commanded = (*force, now);
         self.plant
             .command(&Vector6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0));
         self.largest_force = self.largest_force.max(self.rendered().norm());
@@ -63,7 +80,8 @@ impl HeldArm {
     /// Goes on to `now`, without force from `motors_off` after the last push on.
     pub(crate) fn advance(&mut self, now: Duration, motors_off: Duration) {
         let due = self.due(now);
-        if now.saturating_sub(self.commanded) > motors_off {
+        if now.saturating_sub(self.commanded.1) > motors_off {
+            self.commanded.0 = Vector3::zeros();
             self.plant.command(&Vector6::zeros());
         }
         self.go_on(due);

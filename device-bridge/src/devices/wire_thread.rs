@@ -7,8 +7,8 @@
 //! | the device's | [`WireThread::newest`], [`WireThread::command`]: no lock, no system call, no allocation            |
 //!
 //! No command outlives its reason: from [`HOLDS`] after the last write of the device's loop on [`Line::command`] has none, and a session's last
-//! word is zero. A driver that has let go so renders nothing until the device's loop knows of it ([`WireThread::let_go`]): the next command was made
-//! for a hand that feels the last one, and would be a blow.
+//! word is zero. A driver that has waited for its device that long has let go, too. One that has let go renders nothing until the device's loop
+//! knows of it ([`WireThread::let_go`]): the next command was made for a hand that feels the last one, and would be a blow.
 
 use std::fmt::Display;
 use std::sync::Arc;
@@ -82,8 +82,9 @@ pub(crate) struct Line<S: Send, C: Send> {
     seen: (u64, Duration),
     /// Of this session, where a state answers each command.
     pace: Option<Pace>,
-    /// When the command was taken that the next state answers.
+    /// When the command was taken that the next state answers, and when the last one was.
     asked: Option<Duration>,
+    last_asked: Option<Duration>,
     /// How often the driver has let go, and whether it has rendered a command since.
     let_go: Arc<AtomicU64>,
     renders: bool,
@@ -120,12 +121,16 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
     /// The same for a driver that can render only while `can_render`; it lets go where it cannot.
     pub(crate) fn command_if(&mut self, now: Duration, can_render: bool) -> Option<C> {
         self.asked = Some(now);
+        let last = self.last_asked.replace(now);
+        let has_waited = last.is_some_and(|last| now.saturating_sub(last) >= HOLDS);
+        // Until now nobody has rendered what was commanded, whatever the device's loop was told before.
+        self.renders |= has_waited || !can_render;
         let wanted = *self.wanted.read();
         if wanted.writes != self.seen.0 {
             self.seen = (wanted.writes, now);
         }
         let is_fresh = wanted.writes > 0 && now.saturating_sub(self.seen.1) < HOLDS;
-        if !is_fresh || !can_render {
+        if !is_fresh || !can_render || has_waited {
             self.let_go();
             return None;
         }
@@ -178,6 +183,7 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             seen: (0, Duration::ZERO),
             pace: None,
             asked: None,
+            last_asked: None,
             let_go: Arc::clone(&let_go),
             renders: false,
             end: Arc::clone(&end),

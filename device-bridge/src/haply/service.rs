@@ -52,6 +52,8 @@ pub struct ServiceTotals {
     pub largest_force: f64,
     /// Norm of the force now, N.
     pub force: f64,
+    /// Largest change of the force from one message to the next, N; one to zero is none.
+    pub largest_jump: f64,
 }
 
 impl HaplyService {
@@ -120,6 +122,7 @@ impl HaplyService {
             sessions: self.shared.sessions.load(Ordering::Relaxed),
             largest_force: inverse.largest_force(),
             force: inverse.rendered().norm(),
+            largest_jump: inverse.largest_jump(),
         }
     }
 }

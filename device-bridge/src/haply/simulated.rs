@@ -116,6 +116,12 @@ impl SimulatedInverse {
         self.arm.largest_force()
     }
 
+    /// Largest change of the force from one message to the next so far, N; one to zero is none.
+    #[must_use]
+    pub fn largest_jump(&self) -> f64 {
+        self.arm.largest_jump()
+    }
+
     /// Messages answered so far.
     #[must_use]
     pub fn messages(&self) -> u64 {

@@ -1,5 +1,7 @@
 //! A server on this machine that renders a wall, and a bridge's way to it.
 
+#[cfg(unix)]
+pub mod faulty;
 pub mod floor;
 #[cfg(unix)]
 pub mod stage;
