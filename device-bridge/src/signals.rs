@@ -4,10 +4,12 @@
 //! |--------|------------|
 //! | SIGINT, SIGQUIT | Ctrl-C, Ctrl-\ |
 //! | SIGTERM | the service manager, `kill` |
+//! | SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU, SIGSYS | anybody; each would end the process at once |
 //! | SIGHUP | a terminal or a remote shell that is gone; not where it was ignored at the start (`nohup`) |
 //!
 //! A flag is set in the signal's handler itself: no thread, queue or terminal is on the way from the system to the loop that holds a force, which
-//! looks at the flag in every tick. SIGPIPE is ignored by Rust's runtime: a reader that is gone is an error of a write. What ends a process without
+//! looks at the flag in every tick. SIGPIPE is ignored by Rust's runtime: a reader that is gone is an error of a write; and SIGXFSZ here: a file that
+//! may not grow is one, too. What ends a process without
 //! a word (SIGKILL, a crash, the power) is left to the watchdog of the device: `docs/safety.md`.
 
 use std::io;
@@ -59,6 +61,9 @@ impl EndFlag {
     /// The system takes no handler.
     pub fn listen_into(asked: Arc<AtomicBool>) -> io::Result<Self> {
         let flag = Self::of(asked);
+        // A handler that does nothing, so that the write fails instead.
+        #[cfg(unix)]
+        flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
         for signal in signals() {
             // In this order: the first signal asks, and one that comes when there is no force does what it does by itself.
             flag::register_conditional_default(signal, Arc::clone(&flag.may_be_killed))?;
@@ -91,8 +96,11 @@ fn signals() -> Vec<i32> {
     let mut signals = vec![SIGINT, SIGTERM];
     #[cfg(unix)]
     {
-        use signal_hook::consts::{SIGHUP, SIGQUIT};
-        signals.push(SIGQUIT);
+        use signal_hook::consts::{
+            SIGALRM, SIGHUP, SIGIO, SIGPROF, SIGQUIT, SIGSYS, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
+        };
+        signals.extend([SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM]);
+        signals.extend([SIGVTALRM, SIGPROF, SIGIO, SIGXCPU, SIGSYS]);
         if !is_ignored(SIGHUP) {
             signals.push(SIGHUP);
         }
@@ -114,20 +122,20 @@ fn is_ignored(signal: i32) -> bool {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGQUIT, SIGTERM};
+    use signal_hook::consts::{SIGPIPE, SIGTERM, SIGXFSZ};
 
     #[test]
     fn each_signal_that_asks_for_the_end_sets_the_flag() {
         // This process ignores SIGPIPE, as every Rust program.
         assert!(is_ignored(SIGPIPE) && !is_ignored(SIGTERM));
-        for signal in [SIGINT, SIGTERM, SIGHUP, SIGQUIT] {
-            if is_ignored(signal) {
-                continue; // under nohup
-            }
+        for signal in signals() {
             let flag = EndFlag::listen().expect("handlers");
             assert!(!flag.is_asked());
             signal_hook::low_level::raise(signal).expect("raised");
             assert!(flag.is_asked(), "signal {signal}");
         }
+        let flag = EndFlag::listen().expect("handlers");
+        signal_hook::low_level::raise(SIGXFSZ).expect("raised");
+        assert!(!flag.is_asked(), "a file that may not grow ends nothing");
     }
 }

@@ -278,6 +278,60 @@ fn two_nodes_of_one_name_are_refused() {
 }
 
 #[test]
+fn check_names_what_serve_would_not_bear() {
+    let place = Workplace::new();
+    for (from, to, part) in [
+        (
+            "broadcast_rate = 1000 ",
+            "broadcast_rate = 0.01 ",
+            "broadcast_rate",
+        ),
+        (
+            "# god_object_rate = 1000",
+            "god_object_rate = 5",
+            "god_object_rate",
+        ),
+        ("far = 20.0", "far = 1e9", "cannot be sent"),
+    ] {
+        let changed = workbench().replace(from, to);
+        assert_ne!(changed, workbench(), "{from}");
+        place.write("changed.toml", &changed);
+        let output = taut(&["check", &place.text("changed.toml")]);
+        let said = [output.stdout, output.stderr].concat();
+        let said = String::from_utf8_lossy(&said);
+        assert_eq!(output.status.code(), Some(2), "{to}: {said}");
+        assert!(said.contains(part), "{to}: {said}");
+        assert_eq!(
+            taut(&place.serve("changed.toml", "1", &[])).status.code(),
+            Some(2)
+        );
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_recording_that_cannot_grow_says_so_at_once_and_ends_nothing() {
+    let place = Workplace::new();
+    let recording = place.text("recording");
+    let arguments = place.serve("workbench.toml", "4", &["--recording", &recording]);
+    // 512-byte blocks: 64 KiB a file.
+    let output = Command::new("sh")
+        .args([
+            "-c",
+            "ulimit -f 128; exec \"$0\" \"$@\"",
+            env!("CARGO_BIN_EXE_taut"),
+        ])
+        .args(arguments)
+        .output()
+        .expect("a shell");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let at_once = said.find("nothing is recorded any more");
+    let at_the_end = said.rfind("the recording is not whole");
+    assert!(at_once.is_some() && at_once < at_the_end, "{said}");
+}
+
+#[test]
 fn a_port_in_use_is_named_and_nothing_is_left_running() {
     let place = Workplace::new();
     let other = UdpSocket::bind(("127.0.0.1", 0)).expect("no port");

@@ -96,6 +96,8 @@ pub enum BridgeError {
     NeverJoined {
         /// As given.
         server: String,
+        /// Whether it was to be waited for without end.
+        stays: bool,
     },
     /// The server came back with a scene in which the device stands elsewhere.
     #[error(
@@ -132,12 +134,14 @@ impl BridgeError {
         }
     }
 
-    /// Exit code of the process: 1 failed, 2 bad input.
+    /// Exit code of the process: 0 ended as asked, 1 failed, 2 bad input.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Thread { .. } | Self::Signals(_) => 1,
-            Self::LoopBroke | Self::NeverJoined { .. } => 1,
+            // Who waits for a server without end has done so.
+            Self::NeverJoined { stays, .. } => u8::from(!stays),
+            Self::LoopBroke => 1,
             Self::ServerLost { .. } | Self::OtherScene { .. } => 1,
             _ => 2,
         }

@@ -114,6 +114,7 @@ fn run_loop(
     let Some(first) = runtime.block_on(over.or(rejoiner.join())) else {
         return Err(BridgeError::NeverJoined {
             server: args.server.clone(),
+            stays: args.stay,
         });
     };
     let first = first?;

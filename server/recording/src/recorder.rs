@@ -100,6 +100,12 @@ impl Recorder {
         EventSender(self.events.clone())
     }
 
+    /// Whether records are still written: not any more once a file has failed.
+    #[must_use]
+    pub fn is_writing(&self) -> bool {
+        self.thread.as_ref().is_some_and(|it| !it.is_finished())
+    }
+
     /// Writes what is left, closes the files and says what came of it. Call it when the loops have ended.
     pub fn finish(mut self) -> Summary {
         self.end()
@@ -277,6 +283,9 @@ fn write_until(
         forces: drains.forces.lost(),
     };
     let failure = written.err();
+    if let Some(error) = &failure {
+        tracing::error!("nothing is recorded any more: {error}");
+    }
     let reason = match &failure {
         Some(error) => Some(error.to_string()),
         None if !summary.lost.is_none() => {

@@ -153,7 +153,7 @@ impl Session {
             contacts: self.statistics.god_object.contacts.newest(),
             felt: self.statistics.haptics.felt(),
             largest_force: self.statistics.haptics.largest_force(),
-            is_recorded: self.recorder.is_some(),
+            is_recorded: self.recorder.as_ref().is_some_and(Recorder::is_writing),
         });
     }
 

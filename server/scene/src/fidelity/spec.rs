@@ -1,6 +1,7 @@
 //! `fidelity = "auto"` or `[fidelity]` as written.
 
 use crate::document::{Range, Section, Value};
+use crate::workbench::parts::{MIN_STATES, MIN_UPDATES};
 
 /// Error that is spent unless the scene says otherwise, in just-noticeable differences.
 const BUDGET_J: f64 = 0.5;
@@ -48,15 +49,15 @@ pub(crate) fn fidelity(root: &Section<'_>) -> Option<FidelitySpec> {
     }
     let section = root.section("fidelity")?;
     let wanted = section.choice("mode", &MODES).unwrap_or(true);
-    let rate = |key| section.number(key, Range::PositiveUpTo(MAX_RATE));
+    let rate = |key, least| section.number(key, Range::Between(least, MAX_RATE));
     let spec = FidelitySpec {
         budget_j: section.number_or("budget_j", Range::Positive, BUDGET_J),
         time_us: section.number("time_us", Range::Positive),
         speed: section.number("speed", Range::Positive),
         turn_rate: section.number("turn_rate", Range::NotNegative),
         force: section.number("force", Range::Positive),
-        update_rate: rate("update_rate"),
-        broadcast_rate: rate("broadcast_rate"),
+        update_rate: rate("update_rate", MIN_UPDATES),
+        broadcast_rate: rate("broadcast_rate", MIN_STATES),
         contacts: section
             .integer("contacts", 0, MAX_CONTACTS)
             .map(|n| n as u32),

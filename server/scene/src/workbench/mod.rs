@@ -15,7 +15,7 @@ mod network;
 mod operator;
 mod output;
 mod parse;
-mod parts;
+pub(crate) mod parts;
 mod realtime;
 mod safety;
 mod scale;

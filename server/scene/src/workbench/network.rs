@@ -6,7 +6,7 @@ use taut_proto::{JoinPolicy, barrier::MAX_MEMBERS};
 
 use super::admission::admission;
 use super::frames::{FrameSwap, Frames};
-use super::parts::{Files, MAX_RATE, bind, port};
+use super::parts::{Files, MAX_RATE, MIN_STATES, bind, port};
 use super::spec::{AlsoKeyFile, Network, TransportKind};
 use crate::document::{Range, Section};
 
@@ -180,7 +180,11 @@ pub(super) fn network(
         multicast_interface,
         key_file: files.path(&section, "key_file"),
         also_key: also_key(&section, files),
-        broadcast_rate: section.number_or("broadcast_rate", Range::PositiveUpTo(MAX_RATE), 1000.0),
+        broadcast_rate: section.number_or(
+            "broadcast_rate",
+            Range::Between(MIN_STATES, MAX_RATE),
+            1000.0,
+        ),
         max_clients: section
             .integer("max_clients", 1, MAX_CLIENTS)
             .map_or(16, |n| n as usize),

@@ -8,6 +8,10 @@ use crate::scene::shipped_scene_text;
 
 /// Fastest stream or loop, 1/s.
 pub(super) const MAX_RATE: f64 = 10_000.0;
+/// Fewest states a second: an end, an edit and a new scene wait for the next.
+pub(crate) const MIN_STATES: f64 = 1.0;
+/// Fewest updates a second: constraints that are older than 100 ms fade, and so would the force between two.
+pub(crate) const MIN_UPDATES: f64 = 20.0;
 
 /// Paths in the file are relative to it.
 pub(super) struct Files<'d> {

@@ -1,6 +1,6 @@
 //! Priorities, cores and rates of the loops.
 
-use super::parts::MAX_RATE;
+use super::parts::{MAX_RATE, MIN_UPDATES};
 use super::spec::{RealTime, RealTimeMode};
 use crate::document::{Range, Section};
 
@@ -44,7 +44,8 @@ pub(super) fn realtime(section: Option<Section<'_>>) -> Option<RealTime> {
     realtime.haptics_core = core("haptics_core");
     realtime.coupling_core = core("coupling_core");
     realtime.god_object_core = core("god_object_core");
-    realtime.god_object_rate = section.number("god_object_rate", Range::PositiveUpTo(MAX_RATE));
+    realtime.god_object_rate =
+        section.number("god_object_rate", Range::Between(MIN_UPDATES, MAX_RATE));
     section.finish();
     Some(realtime)
 }

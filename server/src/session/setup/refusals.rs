@@ -6,6 +6,7 @@ use taut_link::proto::{CouplingOffer, EncodeError};
 use taut_link::{ClusterKey, read_key_file};
 use taut_scene::{BuiltScene, Device, DeviceDynamics, Workbench};
 
+use super::content::content;
 use super::devices::device;
 use super::stability::{declared, judge, of_input};
 use super::workbench::{Overrides, driver, external};
@@ -63,6 +64,11 @@ pub fn refusals(workbench: &Workbench) -> (Vec<Refusal>, Vec<String>) {
         external(workbench, &overrides, &placed).map(drop),
     );
     note("scene", "", few_motions(&built));
+    let sent = content(&built, workbench, &placed).and_then(|content| {
+        let checked = content.check();
+        checked.map_err(|error| Failure::BadInput(error.to_string()))
+    });
+    note("scene", "", sent);
     let offered = where_coupled(&built, workbench, &overrides);
     note("scene", "", offered.map(|told| warnings.extend(told)));
     let choice = driver(workbench, &overrides);
