@@ -4,10 +4,7 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use crate::support::faulty::Faulty;
 use crate::support::floor::{Dice, Direct, OnFloor, Wire, floor, ms, placement, wait_until};
-use crate::support::stage::{HANGS, NOT_A_NUMBER, VICE, no_write_jumps, pressed_from};
-use nalgebra::Vector3;
 use taut_bridge::polhem::{Frame, SimulatedPolhem, force_frame};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::Counters;
@@ -42,18 +39,6 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
     wait_until("a force stayed", || {
         terminal.device().rendered().norm() == 0.0
     });
-}
-
-#[test]
-fn no_line_to_the_arm_jumps() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let link = folder.path().join("polhem");
-    let path = pressed_from(Vector3::new(0.01, 0.02, 0.03), -Vector3::z());
-    let arm = SimulatedPolhem::new(VICE, Some(path), None);
-    let line = Faulty::of(arm, |arm| (arm.lines(), arm.commanded()));
-    let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
-    let choice = format!("polhem:{}", link.display());
-    no_write_jumps(&choice, &line, &[HANGS, NOT_A_NUMBER], ms(30));
 }
 
 impl Direct<SimulatedPolhem> {

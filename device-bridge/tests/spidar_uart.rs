@@ -107,7 +107,7 @@ fn no_cycle_of_the_boards_jumps() {
     });
     let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
     let choice = format!("spidar:{}", link.display());
-    no_write_jumps(&choice, &line, &[HANGS, NOT_A_NUMBER], ms(30));
+    no_write_jumps(&choice, &line, &[HANGS, NOT_A_NUMBER], ms(1000));
 }
 
 #[test]

@@ -55,11 +55,6 @@ impl HeldArm {
         self.largest_force
     }
 
-    /// The force that was commanded last, N.
-    pub(crate) fn commanded(&self) -> Vector3<f64> {
-        self.commanded.0
-    }
-
     /// Largest change from one command to the next so far, N; one to zero is none.
     pub(crate) fn largest_jump(&self) -> f64 {
         self.largest_jump

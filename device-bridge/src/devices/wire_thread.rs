@@ -7,8 +7,8 @@
 //! | the device's | [`WireThread::newest`], [`WireThread::command`]: no lock, no system call, no allocation            |
 //!
 //! No command outlives its reason: from [`HOLDS`] after the last write of the device's loop on [`Line::command`] has none, and a session's last
-//! word is zero. A driver that has waited for its device that long has let go, too. One that has let go renders nothing until the device's loop
-//! knows of it ([`WireThread::let_go`]): the next command was made for a hand that feels the last one, and would be a blow.
+//! word is zero. A driver that has let go, or begins a session anew, renders nothing until the device's loop knows of it
+//! once more ([`WireThread::let_go`]): the next command was made for a hand that feels the last one, and would be a blow.
 
 use std::fmt::Display;
 use std::sync::Arc;
@@ -82,12 +82,13 @@ pub(crate) struct Line<S: Send, C: Send> {
     seen: (u64, Duration),
     /// Of this session, where a state answers each command.
     pace: Option<Pace>,
-    /// When the command was taken that the next state answers, and when the last one was.
+    /// When the command was taken that the next state answers.
     asked: Option<Duration>,
-    last_asked: Option<Duration>,
     /// How often the driver has let go, and whether it has rendered a command since.
     let_go: Arc<AtomicU64>,
     renders: bool,
+    /// Commands were made that nobody rendered.
+    missed: bool,
     end: Arc<AtomicBool>,
 }
 
@@ -121,22 +122,26 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
     /// The same for a driver that can render only while `can_render`; it lets go where it cannot.
     pub(crate) fn command_if(&mut self, now: Duration, can_render: bool) -> Option<C> {
         self.asked = Some(now);
-        let last = self.last_asked.replace(now);
-        let has_waited = last.is_some_and(|last| now.saturating_sub(last) >= HOLDS);
         // Until now nobody has rendered what was commanded, whatever the device's loop was told before.
-        self.renders |= has_waited || !can_render;
+        let missed = std::mem::take(&mut self.missed) || !can_render;
+        self.renders |= missed;
         let wanted = *self.wanted.read();
         if wanted.writes != self.seen.0 {
             self.seen = (wanted.writes, now);
         }
         let is_fresh = wanted.writes > 0 && now.saturating_sub(self.seen.1) < HOLDS;
-        if !is_fresh || !can_render || has_waited {
+        if !is_fresh || missed {
             self.let_go();
             return None;
         }
         let knows = wanted.let_go == self.let_go.load(Ordering::Acquire);
         self.renders |= knows;
         knows.then_some(wanted.command)
+    }
+
+    /// The device has had zero for a while, whatever was commanded: the next command is none, and the port begins at zero.
+    pub(crate) fn missed(&mut self) {
+        self.missed = true;
     }
 
     /// There is no force on the hand, though one was commanded.
@@ -183,9 +188,9 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             seen: (0, Duration::ZERO),
             pace: None,
             asked: None,
-            last_asked: None,
             let_go: Arc::clone(&let_go),
             renders: false,
+            missed: false,
             end: Arc::clone(&end),
         };
         let name = wire.name();
@@ -296,6 +301,7 @@ fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
         }
         if !line.is_over() {
             thread::sleep(RETRY);
+            line.missed();
         }
     }
 }

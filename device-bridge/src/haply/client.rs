@@ -197,7 +197,11 @@ impl Talker {
 }
 
 /// Waits for the answer; one that is late gets a message without force after it, and one that never comes ends the connection.
-fn answer(socket: &mut Socket, exchange: &mut Exchange, line: &ArmLine) -> Result<String, Lost> {
+fn answer(
+    socket: &mut Socket,
+    exchange: &mut Exchange,
+    line: &mut ArmLine,
+) -> Result<String, Lost> {
     for wait in 0..WAITS {
         if let Some(text) = next_text(socket)? {
             return Ok(text);
@@ -206,6 +210,7 @@ fn answer(socket: &mut Socket, exchange: &mut Exchange, line: &ArmLine) -> Resul
             break;
         }
         if wait == 0 {
+            line.missed();
             send(socket, exchange.say(Some([0.0; 3])))?;
         }
     }

@@ -37,12 +37,6 @@ impl SimulatedPolhem {
         self.arm.rendered()
     }
 
-    /// The force that was commanded last, N.
-    #[must_use]
-    pub fn commanded(&self) -> Vector3<f64> {
-        self.arm.commanded()
-    }
-
     /// Largest norm of a rendered force so far, N.
     #[must_use]
     pub fn largest_force(&self) -> f64 {

@@ -154,13 +154,14 @@ pub fn goes_wrong(choice: &str, inside: &dyn Inside, modes: &[(i64, &str)]) {
 }
 
 impl Stage {
-    /// A tick whose force the device has written before the next, unless a driver waits for an answer for `patience`.
-    fn written_tick(&mut self, inside: &dyn Inside, patience: Duration) {
+    /// A tick whose force the device has written before the next, unless that takes longer than `patience`; whether it has.
+    fn written_tick(&mut self, inside: &dyn Inside, patience: Duration) -> bool {
         self.tick();
         let (begun, before) = (Instant::now(), inside.get("writes"));
         while inside.get("writes") < before + 2 && begun.elapsed() < patience {
             thread::sleep(ms(1));
         }
+        inside.get("writes") >= before + 2
     }
 
     /// Until the hand feels 2 N.
@@ -198,7 +199,7 @@ pub const BAD_SAMPLES: [i64; 4] = [NOT_A_NUMBER, LONG_QUATERNION, NOT_CALIBRATED
 /// What the port promises of every write holds at the device: samples that are bad for a moment or for long make no jump there, and neither does
 /// the way back after the driver itself has let go.
 ///
-/// While samples are bad a tick waits for its write no longer than `patience`.
+/// While samples are bad a tick waits for its write no longer than `patience`: two ticks in one write would be no fault of a driver.
 pub fn no_write_jumps(choice: &str, inside: &dyn Inside, modes: &[i64], patience: Duration) {
     // uN: 0.5 N/ms, and rounding to digits of eight motors.
     const ALLOWED: i64 = 550_000;
@@ -211,8 +212,11 @@ pub fn no_write_jumps(choice: &str, inside: &dyn Inside, modes: &[i64], patience
             inside.set("served", 0);
             inside.set("mode", mode);
             inside.wait("it goes wrong", &|| inside.get("served") > 0);
+            let mut waits = patience;
             for _ in 0..ticks {
-                stage.written_tick(inside, patience);
+                if !stage.written_tick(inside, waits) {
+                    waits = waits.min(ms(5)); // the line is lost
+                }
             }
             inside.set("mode", GOOD);
             stage.until_pressed(inside);
