@@ -148,7 +148,7 @@ fn no_write_of_a_plug_in_jumps() {
     let library = stand_in(folder.path(), "hand.c", "HAND");
     let inside = Loaded::of(&library);
     let choice = format!("plugin:{}", library.display());
-    no_write_jumps(&choice, &inside, &BAD_SAMPLES, PATIENCE);
+    no_write_jumps(&choice, &inside, &BAD_SAMPLES);
 }
 
 #[test]

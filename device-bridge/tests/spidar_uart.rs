@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::support::faulty::Faulty;
 use crate::support::floor::{Dice, OnFloor, ms};
-use crate::support::stage::{HANGS, NOT_A_NUMBER, VICE, no_write_jumps, pressed_from};
+use crate::support::stage::{Faults, HANGS, NOT_A_NUMBER, VICE, no_write_jumps, pressed_from};
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::{BoardInfo, Counters, Cycle, SimulatedBoards};
@@ -107,7 +107,13 @@ fn no_cycle_of_the_boards_jumps() {
     });
     let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
     let choice = format!("spidar:{}", link.display());
-    no_write_jumps(&choice, &line, &[HANGS, NOT_A_NUMBER], ms(1000));
+    let faults = Faults {
+        modes: &[HANGS, NOT_A_NUMBER],
+        ticks: &[1, 3, 10, 30, 100],
+        allowed: 550_000, // digits of eight motors
+        patience: ms(1000),
+    };
+    no_write_jumps(&choice, &line, &faults);
 }
 
 #[test]

@@ -122,7 +122,7 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
     /// The same for a driver that can render only while `can_render`; it lets go where it cannot.
     pub(crate) fn command_if(&mut self, now: Duration, can_render: bool) -> Option<C> {
         self.asked = Some(now);
-        // Until now nobody has rendered what was commanded, whatever the device's loop was told before.
+        // Nobody has rendered what was commanded until now, whatever the device's loop was told before: it is told once more.
         let missed = std::mem::take(&mut self.missed) || !can_render;
         self.renders |= missed;
         let wanted = *self.wanted.read();

@@ -161,7 +161,9 @@ impl Stage {
         while inside.get("writes") < before + 2 && begun.elapsed() < patience {
             thread::sleep(ms(1));
         }
-        inside.get("writes") >= before + 2
+        let is_written = inside.get("writes") >= before + 2;
+        assert!(is_written || patience < PATIENCE, "it is not written");
+        is_written
     }
 
     /// Until the hand feels 2 N.
@@ -193,26 +195,39 @@ pub fn pressed_from(place: Vector3<f64>, down: Vector3<f64>) -> MinJerkPath {
     MinJerkPath::new(points.to_vec(), false).expect("growing times")
 }
 
+/// What a device goes through in [`no_write_jumps`].
+pub struct Faults {
+    pub modes: &'static [i64],
+    /// For how long, ms.
+    pub ticks: &'static [u64],
+    /// uN from one write to the next: 0.5 N/ms, and rounding.
+    pub allowed: i64,
+    /// A tick waits no longer for its write while the fault lasts. Two ticks in one write would be no fault of a driver.
+    pub patience: Duration,
+}
+
 /// Samples that are bad while the device itself is read and written on.
-pub const BAD_SAMPLES: [i64; 4] = [NOT_A_NUMBER, LONG_QUATERNION, NOT_CALIBRATED, NOTHING_NEW];
+pub const BAD_SAMPLES: Faults = Faults {
+    modes: &[NOT_A_NUMBER, LONG_QUATERNION, NOT_CALIBRATED, NOTHING_NEW],
+    ticks: &[1, 3, 10, 30, 300],
+    allowed: 510_000,
+    patience: PATIENCE,
+};
 
 /// What the port promises of every write holds at the device: samples that are bad for a moment or for long make no jump there, and neither does
 /// the way back after the driver itself has let go.
-///
-/// While samples are bad a tick waits for its write no longer than `patience`: two ticks in one write would be no fault of a driver.
-pub fn no_write_jumps(choice: &str, inside: &dyn Inside, modes: &[i64], patience: Duration) {
-    // uN: 0.5 N/ms, and rounding to digits of eight motors.
-    const ALLOWED: i64 = 550_000;
+pub fn no_write_jumps(choice: &str, inside: &dyn Inside, faults: &Faults) {
+    let allowed = faults.allowed;
     let mut stage = Stage::new(choice, Rearm::Automatic);
     stage.floor = (-0.005, 1000.0);
-    for &mode in modes {
-        for ticks in [1, 3, 10, 30, 100] {
+    for &mode in faults.modes {
+        for &ticks in faults.ticks {
             stage.until_pressed(inside);
             inside.set("jump", 0);
             inside.set("served", 0);
             inside.set("mode", mode);
             inside.wait("it goes wrong", &|| inside.get("served") > 0);
-            let mut waits = patience;
+            let mut waits = faults.patience;
             for _ in 0..ticks {
                 if !stage.written_tick(inside, waits) {
                     waits = waits.min(ms(5)); // the line is lost
@@ -221,7 +236,7 @@ pub fn no_write_jumps(choice: &str, inside: &dyn Inside, modes: &[i64], patience
             inside.set("mode", GOOD);
             stage.until_pressed(inside);
             let jump = inside.get("jump");
-            assert!(jump <= ALLOWED, "mode {mode} for {ticks}: {jump} uN");
+            assert!(jump <= allowed, "mode {mode} for {ticks}: {jump} uN");
         }
     }
     // Nobody ticks any more.
@@ -229,7 +244,7 @@ pub fn no_write_jumps(choice: &str, inside: &dyn Inside, modes: &[i64], patience
     inside.set("jump", 0);
     stage.until_pressed(inside);
     let jump = inside.get("jump");
-    assert!(jump <= ALLOWED, "after the driver let go: {jump} uN");
+    assert!(jump <= allowed, "after the driver let go: {jump} uN");
 }
 
 /// A device that was gone renders nothing until a person arms it again.
