@@ -7,14 +7,14 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::support::floor::{Dice, OnFloor, ms, wait_until};
-use crate::support::stage::{Faults, HANGS, Inside, UNPLUGGED, VICE, no_write_jumps, pressed_from};
+use crate::support::stage::{Faults, HANGS, Inside, UNPLUGGED, VICE, no_write_jumps};
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3, Vector6};
 use taut_bridge::haply::{
     Exchange, ExchangeSettings, HaplyService, ServiceAddress, SimulatedInverse, SimulatedSettings,
 };
 use taut_bridge::{
-    Anchor, ArmDevice, ArmPort, ArmState, Device, Hand, HaplySettings, Placement, Pose,
-    SafetySettings,
+    Anchor, ArmDevice, ArmPort, ArmState, Device, Hand, HaplySettings, MinJerkPath, Placement,
+    Pose, SafetySettings,
 };
 
 /// Of the wall below the start, N/m.
@@ -117,7 +117,7 @@ impl Inside for Sometimes {
 fn no_message_to_the_arm_jumps() {
     let any = "127.0.0.1:0".parse().expect("an address");
     let held = SimulatedSettings {
-        path: Some(pressed_from(Vector3::new(0.0, -0.1, 0.16), -Vector3::z())),
+        path: Some(MinJerkPath::hold(Pose::translation(0.0, -0.1, 0.16))),
         ..SimulatedSettings::held(VICE)
     };
     let service = HaplyService::start(any, SimulatedInverse::new(&held)).expect("a free port");
@@ -125,8 +125,10 @@ fn no_message_to_the_arm_jumps() {
     let faults = Faults {
         modes: &[HANGS, UNPLUGGED],
         ticks: &[1, 3, 10, 30, 100],
-        allowed: 550_000, // the hand still goes down a little
-        patience: ms(5),  // a driver that waits for an answer writes nothing
+        floor: 0.003,
+        allowed: 510_000,
+        keeps_force: false,
+        patience: ms(1000),
     };
     no_write_jumps(&choice, &Sometimes(service), &faults);
 }

@@ -4,11 +4,15 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::support::faulty::Faulty;
 use crate::support::floor::{Dice, Direct, OnFloor, Wire, floor, ms, placement, wait_until};
+use crate::support::stage::{Faults, HANGS, NOT_A_NUMBER, VICE, no_write_jumps};
 use taut_bridge::polhem::{Frame, SimulatedPolhem, force_frame};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::Counters;
-use taut_bridge::{ArmDevice, ArmState, DeviceChoice, Hand, InputChoice, PolhemSettings};
+use taut_bridge::{
+    ArmDevice, ArmState, DeviceChoice, Hand, InputChoice, MinJerkPath, PolhemSettings, Pose,
+};
 
 #[test]
 fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
@@ -39,6 +43,25 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
     wait_until("a force stayed", || {
         terminal.device().rendered().norm() == 0.0
     });
+}
+
+#[test]
+fn no_line_to_the_board_jumps() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let link = folder.path().join("polhem");
+    let path = MinJerkPath::hold(Pose::translation(0.01, 0.02, 0.03));
+    let arm = SimulatedPolhem::new(VICE, Some(path), None);
+    let line = Faulty::of(arm, |arm| (arm.lines(), arm.commanded()));
+    let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
+    let faults = Faults {
+        modes: &[HANGS, NOT_A_NUMBER],
+        ticks: &[1, 3, 10, 30, 100],
+        floor: 0.003,
+        allowed: 510_000,
+        keeps_force: false,
+        patience: ms(1000),
+    };
+    no_write_jumps(&format!("polhem:{}", link.display()), &line, &faults);
 }
 
 impl Direct<SimulatedPolhem> {

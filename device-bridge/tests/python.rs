@@ -23,8 +23,9 @@ const UNKNOWN_KEY: i64 = 12;
 const PRINTS: i64 = 13;
 const WRITES_TO_THE_LINK: i64 = 14;
 const WRITE_RAISES: i64 = 15;
-const PLACES: [&str; 10] = [
+const PLACES: [&str; 11] = [
     "mode", "served", "force", "torque", "after", "closes", "opens", "process", "writes", "jump",
+    "fall",
 ];
 
 fn here() -> &'static Path {

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use crate::support::faulty::Faulty;
 use crate::support::floor::{Dice, OnFloor, ms};
-use crate::support::stage::{Faults, HANGS, NOT_A_NUMBER, VICE, no_write_jumps, pressed_from};
-use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use crate::support::stage::{Faults, HANGS, NOT_A_NUMBER, VICE, no_write_jumps};
+use nalgebra::{Isometry3, Point3, Vector6};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::{BoardInfo, Counters, Cycle, SimulatedBoards};
 use taut_bridge::{
@@ -94,8 +94,7 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
 fn no_cycle_of_the_boards_jumps() {
     let folder = tempfile::tempdir().expect("a folder");
     let link = folder.path().join("boards");
-    // The frame's y is the workbench's z.
-    let path = pressed_from(Vector3::zeros(), -Vector3::y());
+    let path = MinJerkPath::hold(Pose::identity());
     let boards = SimulatedBoards::new(&geometry(), VICE, Some(path), None, false, [0; STRINGS]);
     let line = Faulty::of(boards.expect("volts are known"), |boards| {
         let (cycles, digits) = (boards.cycles() / 2, *boards.digits());
@@ -110,7 +109,9 @@ fn no_cycle_of_the_boards_jumps() {
     let faults = Faults {
         modes: &[HANGS, NOT_A_NUMBER],
         ticks: &[1, 3, 10, 30, 100],
+        floor: 0.003,
         allowed: 550_000, // digits of eight motors
+        keeps_force: false,
         patience: ms(1000),
     };
     no_write_jumps(&choice, &line, &faults);

@@ -50,6 +50,11 @@ impl HeldArm {
         self.plant.rendered_wrench().fixed_rows::<3>(0).into()
     }
 
+    /// The last command, N.
+    pub(crate) fn commanded(&self) -> Vector3<f64> {
+        self.commanded.0
+    }
+
     /// Largest norm of a rendered force so far, N.
     pub(crate) fn largest_force(&self) -> f64 {
         self.largest_force

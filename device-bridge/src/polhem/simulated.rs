@@ -37,6 +37,12 @@ impl SimulatedPolhem {
         self.arm.rendered()
     }
 
+    /// The force of the last line, N, unless the motors are off since.
+    #[must_use]
+    pub fn commanded(&self) -> Vector3<f64> {
+        self.arm.commanded()
+    }
+
     /// Largest norm of a rendered force so far, N.
     #[must_use]
     pub fn largest_force(&self) -> f64 {

@@ -13,6 +13,7 @@ _Atomic long long taut_test_after;  /* the first force after a hang, uN; -1 befo
 _Atomic long long taut_test_closes; /* closes with the force at zero */
 _Atomic long long taut_test_writes; /* forces that were written */
 _Atomic long long taut_test_jump;   /* the largest change from one to the next, uN */
+_Atomic long long taut_test_fall;   /* the largest that was let go, uN */
 
 static double height, rising, pushed;
 
@@ -27,8 +28,9 @@ static void step(void)
 static void render(double force, double torque)
 {
     long long change = (long long)(fabs(force - pushed) * 1e6);
-    if (change > taut_test_jump)
-        taut_test_jump = change;
+    _Atomic long long *largest = force == 0 ? &taut_test_fall : &taut_test_jump;
+    if (change > *largest)
+        *largest = change;
     taut_test_writes++;
     pushed = force;
     taut_test_force = (long long)(force * 1e6);

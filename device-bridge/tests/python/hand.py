@@ -8,7 +8,7 @@ import time
 GOOD, HANGS, NOT_A_NUMBER, LONG_QUATERNION, TOO_HOT, UNPLUGGED, NOTHING_NEW, NOT_CALIBRATED = range(8)
 # Python's own ways.
 STUBBORN, EXITS, CRASHES, WRONG_SHAPE, UNKNOWN_KEY, PRINTS, WRITES_TO_THE_LINK, WRITE_RAISES = range(8, 16)
-PLACES = ["mode", "served", "force", "torque", "after", "closes", "opens", "process", "writes", "jump"]
+PLACES = ["mode", "served", "force", "torque", "after", "closes", "opens", "process", "writes", "jump", "fall"]
 
 
 class Device:
@@ -89,7 +89,8 @@ class Device:
         if self.get("mode") == WRITE_RAISES and any(wrench):
             self.set("served", self.get("served") + 1)
             raise RuntimeError("the motors do not listen")
-        self.set("jump", max(self.get("jump"), int(abs(wrench[2] - self.pushed) * 1e6)))
+        change = "jump" if wrench[2] else "fall"
+        self.set(change, max(self.get(change), int(abs(wrench[2] - self.pushed) * 1e6)))
         self.set("writes", self.get("writes") + 1)
         self.pushed = wrench[2]
         self.set("force", int(wrench[2] * 1e6))

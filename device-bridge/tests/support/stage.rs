@@ -3,10 +3,10 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
-use nalgebra::{Point3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Point3, Vector6};
 use taut_bridge::{
     ArmingState, Command, CommandSource, Device, DeviceChoice, DeviceFault, DevicePort, Hand,
-    MinJerkPath, Placement, Pose, Rearm, SafetySettings, ViaPoint,
+    Placement, Pose, Rearm, SafetySettings,
 };
 
 /// Only a hang takes this long.
@@ -55,6 +55,11 @@ pub struct Stage {
     pub time: u64,
     /// Height of a floor, m, and its stiffness, N/m.
     pub floor: (f64, f64),
+    /// Writes of a line that is lost.
+    lost_at: Option<i64>,
+    /// Of the last tick, and the longest time between two.
+    ticked: Instant,
+    longest_gap: Duration,
 }
 
 impl Stage {
@@ -70,6 +75,9 @@ impl Stage {
             port,
             time: 1000,
             floor: (-0.02, 200.0),
+            lost_at: None,
+            ticked: Instant::now(),
+            longest_gap: Duration::ZERO,
         }
     }
 
@@ -77,6 +85,8 @@ impl Stage {
     pub fn tick(&mut self) -> (Option<DeviceFault>, f64) {
         self.time += 1;
         let now = ms(self.time);
+        self.longest_gap = self.longest_gap.max(self.ticked.elapsed());
+        self.ticked = Instant::now();
         let (floor, stiffness) = self.floor;
         let report = self.port.tick(now, |reading| {
             let below = (floor - reading.sample.pose.translation.vector.z).max(0.0);
@@ -154,23 +164,41 @@ pub fn goes_wrong(choice: &str, inside: &dyn Inside, modes: &[(i64, &str)]) {
 }
 
 impl Stage {
-    /// A tick whose force the device has written before the next, unless that takes longer than `patience`; whether it has.
-    fn written_tick(&mut self, inside: &dyn Inside, patience: Duration) -> bool {
+    /// A tick whose force the device has written before the next: two ticks in one write would be no fault of a driver. A line that writes nothing for
+    /// `patience` is lost, and not waited for until it writes again.
+    fn written_tick(&mut self, inside: &dyn Inside, patience: Duration) {
         self.tick();
         let (begun, before) = (Instant::now(), inside.get("writes"));
-        while inside.get("writes") < before + 2 && begun.elapsed() < patience {
+        loop {
+            let writes = inside.get("writes");
+            if writes >= before + 2 {
+                self.lost_at = None;
+                return;
+            }
+            let waits = if self.lost_at == Some(writes) {
+                ms(5)
+            } else {
+                patience
+            };
+            if begun.elapsed() > waits {
+                assert!(patience < PATIENCE, "it is not written");
+                self.lost_at = Some(writes);
+                return;
+            }
             thread::sleep(ms(1));
         }
-        let is_written = inside.get("writes") >= before + 2;
-        assert!(is_written || patience < PATIENCE, "it is not written");
-        is_written
     }
 
     /// Until the hand feels 2 N.
     fn until_pressed(&mut self, inside: &dyn Inside) {
         let begun = Instant::now();
+        self.lost_at = None;
         while inside.get("force") < 2_000_000 {
-            assert!(begun.elapsed() < PATIENCE, "nothing is felt");
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "{} uN is felt",
+                inside.get("force")
+            );
             self.written_tick(inside, PATIENCE);
         }
     }
@@ -186,23 +214,18 @@ pub const VICE: Hand = Hand {
     rotational_stiffness: 200.0,
 };
 
-/// The vice goes 8 mm down in 2 s, which is 3 mm below the floor of [`no_write_jumps`], and stays.
-pub fn pressed_from(place: Vector3<f64>, down: Vector3<f64>) -> MinJerkPath {
-    let points = [(0.0, 0.0), (2.0, 8e-3)].map(|(time_s, way)| ViaPoint {
-        time_s,
-        pose: Pose::from_parts((place + way * down).into(), UnitQuaternion::identity()),
-    });
-    MinJerkPath::new(points.to_vec(), false).expect("growing times")
-}
-
 /// What a device goes through in [`no_write_jumps`].
 pub struct Faults {
     pub modes: &'static [i64],
     /// For how long, ms.
     pub ticks: &'static [u64],
+    /// Height of a floor of 1000 N/m over the place where the device was found, m. A hand in a vice does not move: 3 mm are 3 N.
+    pub floor: f64,
     /// uN from one write to the next: 0.5 N/ms, and rounding.
     pub allowed: i64,
-    /// A tick waits no longer for its write while the fault lasts. Two ticks in one write would be no fault of a driver.
+    /// The driver must not let go meanwhile.
+    pub keeps_force: bool,
+    /// Without a write for this long the line is lost.
     pub patience: Duration,
 }
 
@@ -210,7 +233,9 @@ pub struct Faults {
 pub const BAD_SAMPLES: Faults = Faults {
     modes: &[NOT_A_NUMBER, LONG_QUATERNION, NOT_CALIBRATED, NOTHING_NEW],
     ticks: &[1, 3, 10, 30, 300],
+    floor: -0.005, // a hand of their own goes below it
     allowed: 510_000,
+    keeps_force: true,
     patience: PATIENCE,
 };
 
@@ -219,24 +244,30 @@ pub const BAD_SAMPLES: Faults = Faults {
 pub fn no_write_jumps(choice: &str, inside: &dyn Inside, faults: &Faults) {
     let allowed = faults.allowed;
     let mut stage = Stage::new(choice, Rearm::Automatic);
-    stage.floor = (-0.005, 1000.0);
+    stage.floor = (faults.floor, 1000.0);
     for &mode in faults.modes {
         for &ticks in faults.ticks {
             stage.until_pressed(inside);
             inside.set("jump", 0);
+            if faults.keeps_force {
+                inside.set("fall", 0);
+            }
+            stage.longest_gap = Duration::ZERO;
             inside.set("served", 0);
             inside.set("mode", mode);
             inside.wait("it goes wrong", &|| inside.get("served") > 0);
-            let mut waits = faults.patience;
             for _ in 0..ticks {
-                if !stage.written_tick(inside, waits) {
-                    waits = waits.min(ms(5)); // the line is lost
-                }
+                stage.written_tick(inside, faults.patience);
             }
             inside.set("mode", GOOD);
             stage.until_pressed(inside);
             let jump = inside.get("jump");
             assert!(jump <= allowed, "mode {mode} for {ticks}: {jump} uN");
+            // A driver lets go of its own where nobody ticks for 20 ms, which a busy machine brings about.
+            if faults.keeps_force && stage.longest_gap < ms(15) {
+                let fall = inside.get("fall");
+                assert!(fall <= allowed, "mode {mode} for {ticks}: {fall} uN let go");
+            }
         }
     }
     // Nobody ticks any more.
