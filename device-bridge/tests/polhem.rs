@@ -51,7 +51,7 @@ fn no_line_to_the_board_jumps() {
     let link = folder.path().join("polhem");
     let path = MinJerkPath::hold(Pose::translation(0.01, 0.02, 0.03));
     let arm = SimulatedPolhem::new(VICE, Some(path), None);
-    let line = Faulty::of(arm, |arm| (arm.lines(), arm.commanded()));
+    let line = Faulty::of(arm, SimulatedPolhem::lines, |arm| arm.commanded());
     let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
     let faults = Faults {
         modes: &[HANGS, NOT_A_NUMBER],

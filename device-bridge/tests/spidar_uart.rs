@@ -96,14 +96,19 @@ fn no_cycle_of_the_boards_jumps() {
     let link = folder.path().join("boards");
     let path = MinJerkPath::hold(Pose::identity());
     let boards = SimulatedBoards::new(&geometry(), VICE, Some(path), None, false, [0; STRINGS]);
-    let line = Faulty::of(boards.expect("volts are known"), |boards| {
-        let (cycles, digits) = (boards.cycles() / 2, *boards.digits());
-        let volts = geometry().volts(&[1.0; STRINGS]).expect("known");
-        let tensions: PerString =
-            std::array::from_fn(|i| f64::from(digits[i]) / (volts[i] * 4096.0 / 3.3));
-        let strings = StringMatrix::at(&geometry(), &boards.held().true_pose());
-        (cycles, strings.wrench(&tensions).fixed_rows::<3>(0).into())
-    });
+    let boards = boards.expect("volts are known");
+    let line = Faulty::of(
+        boards,
+        |boards| boards.cycles() / 2,
+        |boards| {
+            let digits = *boards.digits();
+            let volts = geometry().volts(&[1.0; STRINGS]).expect("known");
+            let tensions: PerString =
+                std::array::from_fn(|i| f64::from(digits[i]) / (volts[i] * 4096.0 / 3.3));
+            let strings = StringMatrix::at(&geometry(), &boards.held().true_pose());
+            strings.wrench(&tensions).fixed_rows::<3>(0).into()
+        },
+    );
     let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
     let choice = format!("spidar:{}", link.display());
     let faults = Faults {

@@ -67,6 +67,14 @@ pub enum BoardsError {
         /// That were found.
         motors: usize,
     },
+    /// They are there, and say nothing that is to be believed.
+    #[error(
+        "the motor boards on {path} answer, but not in time or not twice alike, so that nobody knows where the grip is; look at their cables, and whether this machine is busy"
+    )]
+    Counts {
+        /// As given.
+        path: String,
+    },
     /// Nothing is known of the amplifiers.
     #[error(
         "the geometry {0} has no `volts_per_newton`, without which no current is known; write it into its file"
@@ -125,9 +133,8 @@ impl SpidarBoards {
         let until = monotonic_now() + COUNTS_WITHIN;
         while thread.newest().readings == 0 {
             if monotonic_now() > until {
-                return Err(BoardsError::Motors {
+                return Err(BoardsError::Counts {
                     path: path.to_owned(),
-                    motors: STRINGS,
                 });
             }
             thread::sleep(LOOK);

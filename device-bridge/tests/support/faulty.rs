@@ -11,8 +11,10 @@ use super::stage::{GOOD, HANGS, Inside, NOT_A_NUMBER};
 /// A device at the far end of a line.
 pub struct Faulty<T> {
     pub device: T,
-    /// Commands so far, and the force that the last one is, N.
-    commanded: fn(&mut T) -> (u64, Vector3<f64>),
+    /// Commands so far.
+    commands: fn(&T) -> u64,
+    /// The force of the last one, N.
+    commanded: fn(&mut T) -> Vector3<f64>,
     mode: i64,
     served: i64,
     seen: (u64, Vector3<f64>),
@@ -20,9 +22,14 @@ pub struct Faulty<T> {
 }
 
 impl<T> Faulty<T> {
-    pub fn of(device: T, commanded: fn(&mut T) -> (u64, Vector3<f64>)) -> Arc<Mutex<Self>> {
+    pub fn of(
+        device: T,
+        commands: fn(&T) -> u64,
+        commanded: fn(&mut T) -> Vector3<f64>,
+    ) -> Arc<Mutex<Self>> {
         Arc::new(Mutex::new(Self {
             device,
+            commands,
             commanded,
             mode: GOOD,
             served: 0,
@@ -30,19 +37,27 @@ impl<T> Faulty<T> {
             jump: 0.0,
         }))
     }
-}
 
-impl<T: FarEnd> FarEnd for Faulty<T> {
-    fn take(&mut self, now: Duration, bytes: &[u8], out: &mut Vec<u8>) {
-        let begun = out.len();
-        self.device.take(now, bytes, out);
-        let (commands, force) = (self.commanded)(&mut self.device);
+    fn see(&mut self) {
+        let commands = (self.commands)(&self.device);
         if commands != self.seen.0 {
+            let force = (self.commanded)(&mut self.device);
             // That a driver lets go is no jump: what comes after it may be one.
             if force.norm() > 1e-9 {
                 self.jump = self.jump.max((force - self.seen.1).norm());
             }
             self.seen = (commands, force);
+        }
+    }
+}
+
+impl<T: FarEnd> FarEnd for Faulty<T> {
+    fn take(&mut self, now: Duration, bytes: &[u8], out: &mut Vec<u8>) {
+        let begun = out.len();
+        // Byte by byte, so that no command is seen with half of the next.
+        for byte in bytes {
+            self.device.take(now, std::slice::from_ref(byte), out);
+            self.see();
         }
         self.served += i64::from(self.mode != GOOD);
         match self.mode {
