@@ -18,6 +18,20 @@ pub struct Bounds {
     pub text: &'static str,
 }
 
+impl Bounds {
+    /// The smallest that a message may say.
+    #[must_use]
+    pub const fn least(&self) -> f64 {
+        self.least
+    }
+
+    /// The largest.
+    #[must_use]
+    pub const fn most(&self) -> f64 {
+        self.most
+    }
+}
+
 /// A number of a message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Number {

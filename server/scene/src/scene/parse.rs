@@ -37,12 +37,21 @@ pub(super) struct SceneSpec {
     pub(super) fidelity: Option<FidelitySpec>,
 }
 
+/// One line, as it is printed and sent.
+fn scene_name(root: &Section<'_>) -> Option<String> {
+    let name = root.required_text("name", "name = \"my-scene\"")?;
+    if name.contains(char::is_control) {
+        let at = root.get("name").map_or(root.at(), |node| &node.at);
+        let text = format!("the name {name:?} has a control character; write another");
+        root.complain(at, text);
+    }
+    Some(name.to_owned())
+}
+
 pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
     let problems = RefCell::new(Vec::new());
     let root = Section::root(&document.root, &problems);
-    let name = root
-        .required_text("name", "name = \"my-scene\"")
-        .map(str::to_owned);
+    let name = scene_name(&root);
     let god_object = match root.section("god_object") {
         Some(section) => god_object(section),
         None => {

@@ -2,6 +2,7 @@
 //! that it overrides.
 
 use god_object::{Adaptation, RotationMetric, Settings, SolverKind};
+use taut_proto::range::STIFFNESS;
 
 use crate::document::{Range, Section, Value};
 
@@ -44,7 +45,7 @@ settings_table! {
         /// Share of the pose difference covered in one update.
         pub k_s: f64 = number(Range::PositiveUpTo(1.0)) => k_s;
         /// Coupling constant, 1/s^2.
-        pub k_h: f64 = number(Range::Positive) => k_h;
+        pub k_h: f64 = number(Range::Between(STIFFNESS.least(), STIFFNESS.most())) => k_h;
         /// Damping over stiffness, s.
         pub damping_time: f64 = number(Range::NotNegative) => damping_time;
         /// Contacts before they touch.

@@ -160,6 +160,14 @@ fn every_fault_names_file_line_and_key() {
             "s.toml:12: `k_s` in [coupling] is 1.5, but must be greater than zero and at most 1",
         ),
         (
+            changed("k_h = 2000.0", "k_h = 1e160"),
+            "s.toml:13: `k_h` in [coupling] is ",
+        ),
+        (
+            changed("name = \"test\"", "name = \"te\\nst\""),
+            "s.toml:1: the name \"te\\nst\" has a control character",
+        ),
+        (
             changed("threshold = -1e-3", "threshold = 1e-3"),
             "s.toml:15: `threshold` in [coupling] adaptation is 0.001, but must be a finite number not above zero",
         ),

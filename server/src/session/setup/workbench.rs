@@ -1,7 +1,7 @@
 //! From the workbench file to what a session is made of.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -238,6 +238,8 @@ fn recording(directory: PathBuf, scene: &Scene, built: &BuiltScene) -> Recording
             program: format!("taut {}", env!("CARGO_PKG_VERSION")),
             scene: scene.name().to_owned(),
             origin: source.directory.map_or(SceneOrigin::Shipped, |directory| {
+                // A file without a folder is in this one.
+                let directory = Path::new(".").join(directory);
                 // Where it is now counts; a directory that vanished meanwhile is told when it is looked into.
                 SceneOrigin::Directory(std::path::absolute(&directory).unwrap_or(directory))
             }),
