@@ -309,63 +309,6 @@ fn check_names_what_serve_would_not_bear() {
 }
 
 #[test]
-fn a_recording_of_a_scene_in_the_current_folder_is_replayed_from_any_other() {
-    let place = tempfile::tempdir().expect("a folder");
-    let held = "pose = { position = [0.0, 0.0, 0.1], rotation = [1.0, 0.0, 0.0, 0.0] }";
-    let scene = format!(
-        "name = \"here\"\n[god_object]\nshape = {{ sphere = {{ radius = 0.01 }} }}\nmass = 1.0\n{held}\n[[obstacle]]\nname = \"box\"\nshape = {{ box = {{ half_extents = [0.1, 0.1, 0.01] }} }}\nmotion = {{ trace = \"way.csv\", loop = true }}\n"
-    );
-    let way = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0,0,0.01,1,0,0,0\n2,0,0,0,1,0,0,0\n";
-    for (file, text) in [("here.toml", scene.as_str()), ("way.csv", way)] {
-        std::fs::write(place.path().join(file), text).expect("written");
-    }
-    let demo = [
-        "demo",
-        "--scene",
-        "here.toml",
-        "--headless",
-        "--duration",
-        "1",
-        "--recording",
-        "made",
-    ];
-    let output = Command::new(env!("CARGO_BIN_EXE_taut"))
-        .args(demo)
-        .current_dir(place.path())
-        .output()
-        .expect("it starts");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
-    let made = place.path().join("made");
-    let output = taut(&["replay", "--recording", &made.to_string_lossy()]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
-}
-
-#[cfg(unix)]
-#[test]
-fn a_recording_that_cannot_grow_says_so_at_once_and_ends_nothing() {
-    let place = Workplace::new();
-    let recording = place.text("recording");
-    let arguments = place.serve("workbench.toml", "4", &["--recording", &recording]);
-    // 512-byte blocks: 64 KiB a file.
-    let output = Command::new("sh")
-        .args([
-            "-c",
-            "ulimit -f 128; exec \"$0\" \"$@\"",
-            env!("CARGO_BIN_EXE_taut"),
-        ])
-        .args(arguments)
-        .output()
-        .expect("a shell");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    let at_once = said.find("nothing is recorded any more");
-    let at_the_end = said.rfind("the recording is not whole");
-    assert!(at_once.is_some() && at_once < at_the_end, "{said}");
-}
-
-#[test]
 fn a_port_in_use_is_named_and_nothing_is_left_running() {
     let place = Workplace::new();
     let other = UdpSocket::bind(("127.0.0.1", 0)).expect("no port");

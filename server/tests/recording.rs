@@ -1,6 +1,7 @@
 //! A live session that is recorded, and computed again from its files: the same bits.
 
 use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use taut::commands::replay::recorded;
@@ -12,7 +13,7 @@ use taut::shared::failure::Failure;
 use taut::shared::shutdown::Shutdown;
 use taut_link::ClusterKey;
 
-use crate::support::{shipped_workbench, taut};
+use crate::support::{Workplace, shipped_workbench, taut};
 
 /// How long a session runs at least: the simulated hand touches before.
 const RUN: Duration = Duration::from_millis(2500);
@@ -215,4 +216,59 @@ fn a_recording_is_never_written_over_another() {
     let second = std::panic::catch_unwind(|| record("sphere-on-plane", directory.path()));
     assert!(second.is_err());
     assert!(again(directory.path()).is_ok_and(|report| report.first_difference.is_none()));
+}
+
+/// A scene of two files in the folder where it is used.
+const HERE: &str = r#"name = "here"
+[god_object]
+shape = { sphere = { radius = 0.01 } }
+mass = 1.0
+pose = { position = [0.0, 0.0, 0.1], rotation = [1.0, 0.0, 0.0, 0.0] }
+[[obstacle]]
+name = "box"
+shape = { box = { half_extents = [0.1, 0.1, 0.01] } }
+motion = { trace = "way.csv", loop = true }
+"#;
+const WAY: &str = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0,0,0.01,1,0,0,0\n2,0,0,0,1,0,0,0\n";
+
+#[test]
+fn a_recording_of_a_scene_in_the_current_folder_is_replayed_from_any_other() {
+    let place = tempfile::tempdir().expect("a folder");
+    for (file, text) in [("here.toml", HERE), ("way.csv", WAY)] {
+        std::fs::write(place.path().join(file), text).expect("written");
+    }
+    let output = Command::new(env!("CARGO_BIN_EXE_taut"))
+        .args("demo --scene here.toml --headless --duration 1 --recording made".split(' '))
+        .current_dir(place.path())
+        .output()
+        .expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let made = place.path().join("made");
+    let output = taut(&["replay", "--recording", &made.to_string_lossy()]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_recording_that_cannot_grow_says_so_at_once_and_ends_nothing() {
+    let place = Workplace::new();
+    let recording = place.text("recording");
+    let arguments = place.serve("workbench.toml", "4", &["--recording", &recording]);
+    // 512-byte blocks: 64 KiB a file.
+    let output = Command::new("sh")
+        .args([
+            "-c",
+            "ulimit -f 128; exec \"$0\" \"$@\"",
+            env!("CARGO_BIN_EXE_taut"),
+        ])
+        .args(arguments)
+        .output()
+        .expect("a shell");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let at_once = said.find("nothing is recorded any more");
+    let at_the_end = said.rfind("the recording is not whole");
+    assert!(at_once.is_some() && at_once < at_the_end, "{said}");
 }
