@@ -55,10 +55,11 @@ pub struct Stage {
     pub time: u64,
     /// Height of a floor, m, and its stiffness, N/m.
     pub floor: (f64, f64),
-    /// Writes of a line that is lost.
+    /// How many writes a line had made when it was lost.
     lost_at: Option<i64>,
-    /// Of the last tick, and the longest time between two.
+    /// When the last tick was made.
     ticked: Instant,
+    /// Longest time between two ticks.
     longest_gap: Duration,
 }
 

@@ -37,7 +37,7 @@ pub(super) struct SceneSpec {
     pub(super) fidelity: Option<FidelitySpec>,
 }
 
-/// One line, as it is printed and sent.
+/// The scene's name: a single line, because it is printed and sent.
 fn scene_name(root: &Section<'_>) -> Option<String> {
     let name = root.required_text("name", "name = \"my-scene\"")?;
     if name.contains(char::is_control) {
