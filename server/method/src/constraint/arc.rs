@@ -12,10 +12,10 @@
 use nalgebra::Vector3;
 
 use super::collect::for_bits;
-use super::facing::{Facing, NORMAL_CONE_TOLERANCE, Pair};
+use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 
 /// An arc is left by less than this, as the sine of an angle, for the tolerance of the cones and for rounding.
-const ARC_TOLERANCE: f64 = 2.0 * NORMAL_CONE_TOLERANCE;
+const ARC_TOLERANCE: f64 = 2.0 * LOOK_AHEAD_TILT;
 
 /// An edge that a triangle owns, obstacle frame.
 #[derive(Clone, Copy, Debug)]

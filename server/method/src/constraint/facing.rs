@@ -158,12 +158,8 @@ impl Facing<'_> {
         let (x, y) = (p + u * s, q + v * t);
         let gap = normal.dot(&(x - y));
         let into_body = -self.placement.rotation.tr_mul(&normal);
-        // Edges cannot pass each other without meeting, so a row that is known stays true outside the cones; it is there before the body turns back.
-        let tolerance = if self.past_reentrant_edges {
-            LOOK_AHEAD_TILT
-        } else {
-            NORMAL_CONE_TOLERANCE
-        };
+        // Edges cannot pass each other without meeting, so the row is true outside the cones, too; it is there before the body tilts onto it.
+        let tolerance = LOOK_AHEAD_TILT;
         let facing = self.is_near(gap)
             && is_in_edge_cone(self.obstacle, edge_b, &normal, tolerance)
             && is_in_edge_cone(self.body, edge_a, &into_body, tolerance)

@@ -121,7 +121,7 @@ impl Cylinder {
         } else {
             unit
         };
-        b.cone.holds(&normal, NORMAL_CONE_TOLERANCE).then(|| {
+        b.cone.holds(&normal, LOOK_AHEAD_TILT).then(|| {
             Row::between(
                 [Feature::Side, b.feature],
                 [x, y],

@@ -41,7 +41,7 @@ impl Cone<'_> {
             Self::Any => true,
             Self::End(outward) => outward.dot(direction) >= -tolerance,
             Self::Vertex(mesh, v) => is_in_vertex_cone(mesh, *v, direction, tolerance),
-            Self::Edge(mesh, e) => is_in_edge_cone(mesh, *e, direction, NORMAL_CONE_TOLERANCE),
+            Self::Edge(mesh, e) => is_in_edge_cone(mesh, *e, direction, tolerance),
         }
     }
 }
@@ -163,8 +163,7 @@ pub(super) fn rod_rod(a: &Rod, b: &Rod) -> Option<Row> {
     } else {
         unit
     };
-    let facing = a.cone.holds(&-normal, NORMAL_CONE_TOLERANCE)
-        && b.cone.holds(&normal, NORMAL_CONE_TOLERANCE);
+    let facing = a.cone.holds(&-normal, LOOK_AHEAD_TILT) && b.cone.holds(&normal, LOOK_AHEAD_TILT);
     facing.then(|| Row::between([a.feature, b.feature], [x, y], [a.round, b.round], normal))
 }
 
