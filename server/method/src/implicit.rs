@@ -155,18 +155,14 @@ impl ImplicitRounds {
 
     /// Projects again from where the linear rows led to. `None` when they were true, or when no round had a certified answer.
     ///
-    /// `bound_at` gives the bound of a row at x_s, in the order of the constraints. `with_friction` adds friction to a round's frictionless answer, by
-    /// projections on the same rows. At most `implicit_rounds` rounds; no allocation unless the projector allocates.
+    /// `bound_at` gives the bound of a row at x_s, in the order of the constraints. `with_friction` adds friction to a round's frictionless answer; the
+    /// projector has the same rows. At most `implicit_rounds` rounds; no allocation unless the projector allocates.
     pub(crate) fn solve(
         &mut self,
         given: &LinearAnswer,
         bound_at: impl Fn(usize) -> f64,
         metric_at: impl Fn(&Pose) -> Option<Metric>,
-        mut with_friction: impl FnMut(
-            &Round<'_>,
-            &mut dyn FnMut(&Vector6, &[u32]) -> Projection,
-            Projection,
-        ) -> Projection,
+        mut with_friction: impl FnMut(&Round<'_>, &mut Projector, Projection) -> Projection,
     ) -> Option<ImplicitAnswer> {
         let nothing_held = given.projection.active.is_empty();
         if self.rounds == 0 || nothing_held {
@@ -193,9 +189,7 @@ impl ImplicitRounds {
             };
             self.relinearise(given, &bound_at, &candidate);
             let (projector, rows) = (&mut self.projector, &self.rows);
-            let mut project =
-                |a_u: &Vector6, warm: &[u32]| projector.project(&metric, a_u, rows, warm);
-            let frictionless = project(&unconstrained, &self.warm_start);
+            let frictionless = projector.project(&metric, &unconstrained, rows, &self.warm_start);
             let round_problem = Round {
                 metric: &metric,
                 unconstrained: &unconstrained,
@@ -203,7 +197,7 @@ impl ImplicitRounds {
                 center: Point3::from(candidate.translation.vector),
                 rows,
             };
-            let projection = with_friction(&round_problem, &mut project, frictionless);
+            let projection = with_friction(&round_problem, projector, frictionless);
             if projection.status != ProjectionStatus::Solved {
                 break;
             }

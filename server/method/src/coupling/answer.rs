@@ -98,11 +98,7 @@ impl Coupling {
             constraints: &set.constraints,
             moved: None,
         };
-        friction.hold(
-            &problem,
-            |a_u, warm| self.projector.project_prepared(a_u, warm),
-            frictionless,
-        )
+        friction.hold(&problem, &mut self.projector, frictionless)
     }
 
     fn damped(
@@ -140,11 +136,11 @@ impl Coupling {
             &given,
             |row| self.bounds[row],
             |pose| self.basis.metric(pose),
-            |round, project, frictionless| match friction {
+            |round, projector, frictionless| match friction {
                 Some(friction) => {
                     let stuck_at = anchor.acceleration(round.candidate, round.unconstrained, k_s);
                     let problem = given.rough(round, &stuck_at, anchor.carried(k_s));
-                    friction.hold(&problem, project, frictionless)
+                    friction.hold(&problem, projector, frictionless)
                 }
                 None => frictionless,
             },

@@ -71,11 +71,7 @@ impl GodObject {
                 constraints: &self.set.constraints,
                 moved: None,
             };
-            projection = friction.hold(
-                &problem,
-                |a_u, warm| self.projector.project(&metric, a_u, &self.rows, warm),
-                projection,
-            );
+            projection = friction.hold(&problem, &mut self.projector, projection);
         }
         report.kkt = report.kkt.max(projection.kkt_residual);
         report.active = projection.active.len();
@@ -130,14 +126,14 @@ impl GodObject {
             &given,
             |row| self.rows[row].bound,
             |pose| self.world.body.metric(self.settings.rotation_metric, pose),
-            |round, project, frictionless| match friction {
+            |round, projector, frictionless| match friction {
                 Some(friction) => {
                     // What stuck did so where the body is.
                     let from_here =
                         pose_difference(&start, round.candidate, &-angular(&linear.acceleration));
                     let stuck_at = from_here + stuck_at;
                     let problem = given.rough(round, &stuck_at, carried);
-                    friction.hold(&problem, project, frictionless)
+                    friction.hold(&problem, projector, frictionless)
                 }
                 None => frictionless,
             },

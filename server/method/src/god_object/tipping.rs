@@ -51,9 +51,7 @@ impl GodObject {
         }
         report.work.projections += 1;
         let wish = left - first;
-        let mut project =
-            |a_u: &Vector6, warm: &[u32]| self.projector.project(&metric, a_u, &self.rows, warm);
-        let mut second = project(&wish, &[]);
+        let mut second = self.projector.project(&metric, &wish, &self.rows, &[]);
         if let Some(friction) = &mut self.friction {
             let problem = FrictionProblem {
                 metric: &metric,
@@ -65,7 +63,7 @@ impl GodObject {
                 constraints: &held,
                 moved: Some((&start, &reached, false)),
             };
-            second = friction.hold(&problem, project, second);
+            second = friction.hold(&problem, &mut self.projector, second);
         }
         let longer = self.motion_length(&second.acceleration) - self.motion_length(first);
         let (_, second_error) = self.motion_with_friction(&second.acceleration);

@@ -14,7 +14,9 @@ use super::carried::Carried;
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
 use super::contact::{ConeContact, tangents_of};
 use crate::constraint::{FeaturePair, NonPenetrationConstraint, contact_jacobian};
-use crate::quasi_statics::{HalfSpace, MAX_ACTIVE, Metric, Projection, ProjectionStatus};
+use crate::quasi_statics::{
+    HalfSpace, MAX_ACTIVE, Metric, Projection, ProjectionStatus, Projector,
+};
 use crate::settings::Settings;
 use crate::spatial::{Pose, Vector6, linear, six};
 use crate::world::World;
@@ -38,6 +40,8 @@ pub struct Friction {
     /// The rows of the cone problem's contacts, in their order, and their features.
     rows: ArrayVec<u32, MAX_CONE_CONTACTS>,
     features: ArrayVec<FeaturePair, MAX_CONE_CONTACTS>,
+    /// Their bounds in both problems, m.
+    bounds: ArrayVec<f64, MAX_CONE_CONTACTS>,
     /// `L^T (a - a_u)` of the last cone problem: the next one's may be near.
     last: Vector6,
     residual: f64,
@@ -103,6 +107,7 @@ impl Friction {
             cone: ConeProblem::default(),
             rows: ArrayVec::new(),
             features: ArrayVec::new(),
+            bounds: ArrayVec::new(),
             last: Vector6::zeros(),
             residual: 0.0,
             scale: 0.0,
@@ -162,12 +167,11 @@ impl Friction {
     }
 
     /// Adds friction to `frictionless`, the projection of the same problem. Without a frictional contact that carries
-    /// load it is returned unchanged, bit for bit. `project` is Eq. (1) on the same rows for another a_u, from the rows given to
-    /// start with.
+    /// load it is returned unchanged, bit for bit. `projector` has the problem's rows prepared, and has them again afterwards.
     pub fn hold(
         &mut self,
         problem: &FrictionProblem<'_>,
-        mut project: impl FnMut(&Vector6, &[u32]) -> Projection,
+        projector: &mut Projector,
         frictionless: Projection,
     ) -> Projection {
         self.residual = 0.0;
@@ -204,8 +208,16 @@ impl Friction {
         self.last = answer.correction;
         let active: ArrayVec<u32, MAX_ACTIVE> =
             frictionless.active.iter().map(|row| row.row).collect();
-        let Some((projection, correction)) = self.project_with_grip(problem, &active, &mut project)
-        else {
+        // One problem, solved twice: a contact has the same bound in both.
+        for (row, bound) in self.rows.iter().zip(&self.bounds) {
+            projector.set_bound(*row as usize, *bound);
+        }
+        let held = self.project_with_grip(problem, &active, projector);
+        for &row in &self.rows {
+            let row = row as usize;
+            projector.set_bound(row, problem.rows[row].bound);
+        }
+        let Some((projection, correction)) = held else {
             self.residual = f64::INFINITY;
             return frictionless;
         };
@@ -236,6 +248,7 @@ impl Friction {
             };
             self.rows.swap_remove(idle);
             self.features.swap_remove(idle);
+            self.bounds.swap_remove(idle);
             self.cone.contacts.swap_remove(idle);
         }
         self.add(problem, frictionless, index as u32)
@@ -250,6 +263,7 @@ impl Friction {
         self.cone.contacts.clear();
         self.rows.clear();
         self.features.clear();
+        self.bounds.clear();
         self.touched.clear();
         let mut frictional = false;
         // What touched with friction a moment ago most likely does so again.
@@ -310,16 +324,20 @@ impl Friction {
         let tangents = directions.map(point_row);
         let carried = problem.carried.of(constraint);
         let normal = metric.whiten_row(&row.jacobian);
-        // Touching is touching: the contact's own slack at `now` is taken as none.
-        let gap = row.slack(&now.acceleration);
-        let gap = if gap <= self.touching { 0.0 } else { gap };
-        let at_now = metric.whiten(&(now.acceleration - problem.unconstrained));
+        // Touching is touching: what touches where the body sticks does so exactly, or it would not be at rest there; or else where the body goes
+        // without friction.
+        let touches = |a: &Vector6| row.slack(a).abs() <= self.touching;
+        let touching_at = [problem.stuck_at, &now.acceleration];
+        let bound = touching_at
+            .into_iter()
+            .find(|a| touches(a))
+            .map_or(row.bound, |a| row.jacobian.dot(a));
         let wished = problem.unconstrained - problem.stuck_at;
         let contact = ConeContact::new(
             self.coefficient_of(constraint),
             normal,
             tangents.map(|j| metric.whiten_row(&j)),
-            gap - normal.dot(&at_now),
+            row.jacobian.dot(problem.unconstrained) - bound,
             [0, 1].map(|i| tangents[i].dot(&wished) - directions[i].dot(&carried)),
             directions.map(|t| t.dot(&constraint.obstacle_displacement)),
         );
@@ -329,6 +347,7 @@ impl Friction {
         self.cone.contacts.push(contact);
         self.rows.push(index);
         self.features.push(constraint.features);
+        self.bounds.push(bound);
         true
     }
 
@@ -337,11 +356,11 @@ impl Friction {
         &mut self,
         problem: &FrictionProblem<'_>,
         likely: &[u32],
-        project: &mut impl FnMut(&Vector6, &[u32]) -> Projection,
+        projector: &mut Projector,
     ) -> Option<(Projection, Vector6)> {
         for _ in 0..=MAX_HALVINGS {
             let pulled = problem.unconstrained + problem.metric.unwhiten(&self.cone.grip_wrench());
-            let projection = project(&pulled, likely);
+            let projection = projector.project_prepared(&pulled, likely);
             if projection.status != ProjectionStatus::Solved {
                 return None;
             }

@@ -28,15 +28,13 @@ use crate::spatial::Vector6;
 const STIFFNESS: f64 = 5e1;
 const MAX_STEPS: usize = 12;
 /// Most updates of the multipliers (augmentations) of one solve.
-const MAX_AUGMENTATIONS: usize = 5;
-/// It is converged when the slip and penetration that the compliance allows are at most this share of the scale, and
-const FELT_SHARE: f64 = 1e-3;
-/// at most this share of the largest slip, so that sticking contacts do not creep;
-const SHARE_OF_SLIP: f64 = 0.02;
-/// or below this share of the scale. And it has stalled when one augmentation leaves more than
+const MAX_AUGMENTATIONS: usize = 8;
+/// After each of them contacts give so many times less. And it is converged when the slip and penetration that they allow are at most
+const STIFFER: f64 = 10.0;
+/// Where forces do not balance, they are tried again with so much of the stiffness.
+const SOFTER: f64 = 0.2;
+/// this share of the scale.
 const NO_SLIP: f64 = 1e-6;
-/// this share of what the one before left.
-const LEAST_GAIN: f64 = 0.5;
 /// Forces balance when this share of the scale is left.
 const BALANCE_TOLERANCE: f64 = 1e-6;
 
@@ -116,11 +114,11 @@ impl Rows {
     }
 
     #[inline(always)]
-    fn reaction(&self, contact: &ConeContact, y: &Lanes8) -> Reaction {
+    fn reaction(&self, contact: &ConeContact, y: &Lanes8, stiffness: f64) -> Reaction {
         let penetration = contact.slack + dot(&self.normal, y);
-        let load = (contact.load - STIFFNESS * contact.normal_step * penetration).max(0.0);
+        let load = (contact.load - stiffness * contact.normal_step * penetration).max(0.0);
         let slip = self.slip(contact, y);
-        let rate = STIFFNESS * contact.tangent_step;
+        let rate = stiffness * contact.tangent_step;
         let wished = [
             contact.grip[0] - rate * slip[0],
             contact.grip[1] - rate * slip[1],
@@ -149,9 +147,10 @@ impl Rows {
         system: &mut System,
         contact: &ConeContact,
         (reaction, y): (&Reaction, &Lanes8),
+        stiffness: f64,
     ) {
-        let normal_rate = STIFFNESS * contact.normal_step;
-        let rate = STIFFNESS * contact.tangent_step;
+        let normal_rate = stiffness * contact.normal_step;
+        let rate = stiffness * contact.tangent_step;
         let load = contact.load - normal_rate * contact.slack;
         if contact.coefficient <= 0.0 {
             system.add_product(&self.normal, &self.normal, normal_rate, load);
@@ -270,32 +269,30 @@ impl WithSimd for Balance<'_> {
         let tolerance = BALANCE_TOLERANCE * self.scale;
         let mut y = widened(self.start);
         let mut left: Option<f64> = None;
+        let mut stiffness = STIFFNESS;
         for _ in 0..MAX_AUGMENTATIONS {
-            let Some((next, reactions)) = newton(&rows, contacts, &y, tolerance) else {
-                break;
+            let found = newton(&rows, contacts, &y, tolerance, stiffness);
+            let Some((next, reactions)) = found else {
+                stiffness *= SOFTER;
+                continue;
             };
             y = next;
-            let (mut given, mut slip) = (0.0_f64, 0.0_f64);
+            let mut given = 0.0_f64;
             for ((rows, contact), reaction) in rows.iter().zip(&mut *contacts).zip(&reactions) {
                 let grip = reaction.grip();
                 let change = scaled(&rows.normal, reaction.load - contact.load);
                 let change = add_scaled(&change, &rows.tangents[0], grip[0] - contact.grip[0]);
                 let change = add_scaled(&change, &rows.tangents[1], grip[1] - contact.grip[1]);
                 given = given.max(dot(&change, &change));
-                if reaction.load > 0.0 && contact.coefficient > 0.0 {
-                    let [u, v] = rows.slip(contact, &y);
-                    slip = slip.max((u * u + v * v) * contact.tangent_step);
-                }
                 contact.load = reaction.load;
                 contact.grip = grip;
             }
-            let given = given.sqrt() / (STIFFNESS * self.scale);
-            let slow = left.is_some_and(|before| given > LEAST_GAIN * before);
+            let given = given.sqrt() / (stiffness * self.scale);
             left = Some(given);
-            let slip = SHARE_OF_SLIP * slip.sqrt() / self.scale;
-            if slow || given <= slip.clamp(NO_SLIP, FELT_SHARE) {
+            if given <= NO_SLIP {
                 break;
             }
+            stiffness *= STIFFER;
         }
         left
     }
@@ -309,6 +306,7 @@ fn newton(
     contacts: &[ConeContact],
     start: &Lanes8,
     tolerance: f64,
+    stiffness: f64,
 ) -> Option<(Lanes8, [Reaction; MAX_CONE_CONTACTS])> {
     let loaded = contacts.iter().any(|contact| contact.load > 0.0);
     let mut reactions = [Reaction::NONE; MAX_CONE_CONTACTS];
@@ -318,7 +316,7 @@ fn newton(
         let before = reactions;
         let mut rest = y;
         for ((rows, contact), reaction) in rows.iter().zip(contacts).zip(&mut reactions) {
-            *reaction = rows.reaction(contact, &y);
+            *reaction = rows.reaction(contact, &y, stiffness);
             rest = rows.pulled(&rest, reaction);
         }
         if !given && dot(&rest, &rest).sqrt() <= tolerance {
@@ -339,7 +337,7 @@ fn newton(
                 linear.limit = contact.limit();
             }
             if linear.load > 0.0 {
-                rows.add_to(&mut system, contact, (&linear, &y));
+                rows.add_to(&mut system, contact, (&linear, &y), stiffness);
             }
         }
         y = system.solved()?;
