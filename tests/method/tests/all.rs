@@ -16,4 +16,5 @@ mod hand_traces;
 mod machined_parts;
 mod peg_clearances;
 mod scales;
+mod still_hand;
 mod thin_walls;
