@@ -118,7 +118,7 @@ fn unrest(built: &BuiltScene, [from, to]: &[Pose; 2]) -> [f64; 3] {
         let device = between(from, to, (time / ARRIVED).min(1.0));
         let mut wrench = led.step(time, &device).wrench;
         wrench.fixed_rows_mut::<3>(3).scale_mut(100.0);
-        if time >= LOOKED_AT[0] {
+        if std::env::var("ALL").is_ok() || time >= LOOKED_AT[0] {
             step = step.max(last.map_or(0.0, |last| (wrench - last).norm()));
             way = way.max((wrench - *first.get_or_insert(wrench)).norm());
             last = Some(wrench);
