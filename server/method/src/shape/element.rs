@@ -119,7 +119,7 @@ pub(super) fn knob_knob(a: &Knob, b: &Knob) -> Option<Row> {
     })
 }
 
-/// A point over the inside of a segment. Ends of capsules that lie along it are let in before they tilt onto it.
+/// A point over the inside of a segment. Points are let in before the body tilts onto them.
 pub(super) fn knob_rod(a: &Knob, b: &Rod) -> Option<Row> {
     let along = b.ends[1] - b.ends[0];
     let share = along.dot(&(a.at - b.ends[0])) / along.norm_squared();
@@ -128,11 +128,8 @@ pub(super) fn knob_rod(a: &Knob, b: &Rod) -> Option<Row> {
     }
     let foot = b.ends[0] + along * share;
     let normal = (a.at - foot).try_normalize(f64::MIN_POSITIVE)?;
-    let tilt = match a.cone {
-        Cone::End(_) => LOOK_AHEAD_TILT,
-        _ => NORMAL_CONE_TOLERANCE,
-    };
-    let facing = a.cone.holds(&-normal, tilt) && b.cone.holds(&normal, NORMAL_CONE_TOLERANCE);
+    let facing =
+        a.cone.holds(&-normal, LOOK_AHEAD_TILT) && b.cone.holds(&normal, NORMAL_CONE_TOLERANCE);
     facing.then(|| {
         Row::between(
             [a.feature, b.feature],
