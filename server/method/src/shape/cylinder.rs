@@ -155,9 +155,9 @@ impl Cylinder {
                     else {
                         return;
                     };
-                    let facing = -normal.dot(&rim.radial) >= -NORMAL_CONE_TOLERANCE
-                        && -normal.dot(&outward) >= -NORMAL_CONE_TOLERANCE
-                        && b.cone.holds(&normal, NORMAL_CONE_TOLERANCE);
+                    let facing = -normal.dot(&rim.radial) >= -LOOK_AHEAD_TILT
+                        && -normal.dot(&outward) >= -LOOK_AHEAD_TILT
+                        && b.cone.holds(&normal, LOOK_AHEAD_TILT);
                     if facing {
                         let place = CROSSINGS + u8::from(rim.upper);
                         found(Row::between(
