@@ -301,7 +301,7 @@ fn all_of_it_at_many_poses() {
 #[test]
 fn a_peg_that_is_drawn_along_its_hole_feels_coulombs_law() {
     // Facets hold the peg in a wedge: what presses on them is up to 3 % more than what the hand presses with.
-    const WEDGE: [f64; 2] = [0.97, 1.03];
+    const WEDGE: std::ops::RangeInclusive<f64> = 0.97..=1.03;
     for peg in PEGS {
         for (coefficient, speed) in [(0.1, 0.1), (0.3, 0.02), (0.6, 0.003)] {
             let built = peg_in_hole(peg, coefficient);
@@ -326,7 +326,7 @@ fn a_peg_that_is_drawn_along_its_hole_feels_coulombs_law() {
                 if time > 0.5 && 1000.0 * along > 1.3 * most {
                     let share = wrench[1].abs() / most;
                     assert!(
-                        WEDGE[0] <= share && share <= WEDGE[1],
+                        WEDGE.contains(&share),
                         "{peg:?} {coefficient} {speed} m/s at {time}: {share}"
                     );
                     slid += 1;

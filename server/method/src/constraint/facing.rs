@@ -23,8 +23,8 @@ use crate::geometry::distance::barycentric;
 /// How far outside both normal cones the direction may lie, rad: bodies that rest flat on each other do so to about a
 /// micrometre over their size. A ghost slope of 1e-4 is below anything felt.
 pub(crate) const NORMAL_CONE_TOLERANCE: f64 = 1e-4;
-/// The same for a corner over a face, rad. The normal is the face's whatever the corner does, so the row is true; it is there
-/// before the body tilts onto the corner. And for two edges whose row is known from where they faced each other.
+/// The same, rad, for pairs whose row is true however the body is tilted: a corner over a face, which keeps the face's normal, and edges and rims that
+/// cross, which cannot pass each other without meeting. Their rows are there before the body tilts onto them, so that it rests on both of two edges.
 pub(crate) const LOOK_AHEAD_TILT: f64 = 0.02;
 /// How far outside a face a foot may lie: per gap (rad), it covers the wedges over flat edges and then some; per side, rounding.
 const FOOT_TOLERANCE_PER_GAP: f64 = NORMAL_CONE_TOLERANCE;
@@ -158,11 +158,9 @@ impl Facing<'_> {
         let (x, y) = (p + u * s, q + v * t);
         let gap = normal.dot(&(x - y));
         let into_body = -self.placement.rotation.tr_mul(&normal);
-        // Edges cannot pass each other without meeting, so the row is true outside the cones, too; it is there before the body tilts onto it.
-        let tolerance = LOOK_AHEAD_TILT;
         let facing = self.is_near(gap)
-            && is_in_edge_cone(self.obstacle, edge_b, &normal, tolerance)
-            && is_in_edge_cone(self.body, edge_a, &into_body, tolerance)
+            && is_in_edge_cone(self.obstacle, edge_b, &normal, LOOK_AHEAD_TILT)
+            && is_in_edge_cone(self.body, edge_a, &into_body, LOOK_AHEAD_TILT)
             && (inside[0] || {
                 let end = self.body.triangles()[pair.a as usize][(i + usize::from(s > 0.5)) % 3];
                 let [way, across] =

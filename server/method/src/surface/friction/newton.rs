@@ -6,14 +6,14 @@
 //! | y           | `y`          | m kg^(1/2) | `L^T (a - a_u)`                                                      |
 //! | lambda_0    | in the contacts | N s^2   | multipliers to start from                                            |
 //! | lambda(y)   | `Reaction`   | N s^2      | multipliers of one contact at y: `(lambda_0 - r (c + j . y))` on its cone |
-//! | r           | `STIFFNESS`  |            | in units of the contact's own                                        |
+//! | r           | `stiffness`  |            | in units of the contact's own                                        |
 //! | G(y)        |              | m kg^(1/2) | `y - sum j lambda(y)`: zero where forces balance                     |
 //!
 //! What gives by a share 1/r of `lambda - lambda_0` has one answer, however many contacts there are and in whatever order they come. Where it is found,
-//! `lambda` becomes `lambda_0` and the contacts are solved again: they give less each time. A stiffness that does it at once leaves the iteration
-//! going round where contacts hardly slip. The first step takes the contacts that lambda_0 loads for the loaded ones, whatever y says: y is of the
+//! `lambda` becomes `lambda_0` and the contacts are solved again, stiffer: they give less each time, down to a millionth of the way. A stiffness that does it
+//! at once leaves the iteration going round where contacts hardly slip. The first step takes the contacts that lambda_0 loads for the loaded ones, whatever y says: y is of the
 //! sample before, where the hand pressed less or more. A contact whose slip turns back within a step is taken as stuck in the next.
-//! Source: Alart and Curnier 1991, in six unknowns; Simo and Laursen 1992 (augmented Lagrangian of friction).
+//! Source: Alart and Curnier 1991, in six unknowns; Simo and Laursen 1992 (augmented Lagrangian of friction); Bertsekas 1982, Section 2.2 (growing stiffness).
 
 use pulp::{Arch, Simd, WithSimd};
 
