@@ -299,6 +299,41 @@ fn all_of_it_at_many_poses() {
 }
 
 #[test]
+fn shading_changes_nothing_where_every_edge_is_a_crease() {
+    // Pressed on a box at random places, half of them beside its upper face: over edges and corners.
+    let mut worst = 0.0_f64;
+    for body in BODIES {
+        let [plain, shaded] = ["", SHADING].map(|surface| scene(body, MESHES[3], surface));
+        for seed in 0..6 {
+            let mut random = Random(seed);
+            let [mut from, mut to] = landing(&plain, &mut random);
+            let aside = Vector3::new(0.012 + 0.02 * random.unit(), 0.03 * random.unit(), 0.0);
+            for pose in [&mut from, &mut to] {
+                pose.translation.vector += aside;
+            }
+            let mut led = [&plain, &shaded].map(|built| {
+                Led::new(&BuiltScene {
+                    start: from,
+                    ..built.clone()
+                })
+            });
+            for k in 0..850 {
+                let time = f64::from(k) * 1e-3;
+                let device = between(&from, &to, time / ARRIVED);
+                let [a, b] = led.each_mut().map(|led| led.step(time, &device).wrench);
+                let difference = (a - b).fixed_rows::<3>(0).norm();
+                // While the hand moves, the shaded motion is that of the force before.
+                if time >= LOOKED_AT[0] {
+                    worst = worst.max(difference);
+                }
+            }
+        }
+    }
+    println!("{worst:e} N");
+    assert!(worst <= STILL, "{worst} N");
+}
+
+#[test]
 fn a_peg_that_is_drawn_along_its_hole_feels_coulombs_law() {
     // Facets hold the peg in a wedge: what presses on them is up to 3 % more than what the hand presses with.
     const WEDGE: std::ops::RangeInclusive<f64> = 0.97..=1.03;

@@ -232,7 +232,7 @@ impl Surfaces for SceneSurfaces<'_> {
         let turn = self.obstacles[index].turned_from(obstacle);
         let normal = normals.at(
             obstacle,
-            contact.obstacle_triangle,
+            (contact.features.on_obstacle, contact.obstacle_triangle),
             &contact.barycentric,
             &(turn.inverse() * contact.normal),
         );

@@ -7,6 +7,7 @@
 
 use nalgebra::Vector3;
 
+use crate::constraint::Feature;
 use crate::geometry::corner_normals;
 use crate::spatial::Vector6;
 use crate::world::Obstacle;
@@ -27,26 +28,55 @@ pub struct ShadedAcceleration {
 #[derive(Clone, Debug)]
 pub struct ShadingNormals {
     corners: Vec<[Vector3<f64>; 3]>,
+    /// Edges that are creases, and vertices where some meet.
+    creases: Vec<bool>,
+    sharp_vertices: Vec<bool>,
 }
 
 impl ShadingNormals {
     /// Prepares the normals of a shaded obstacle; `None` when its surface is not shaded.
     pub fn of(obstacle: &Obstacle) -> Option<Self> {
-        obstacle.surface.shading.map(|shading| Self {
-            corners: corner_normals(&obstacle.mesh, shading.crease_angle),
+        let shading = obstacle.surface.shading?;
+        let mesh = &obstacle.mesh;
+        let bends = mesh.edges().iter().map(|edge| edge.convexity.abs());
+        let creases: Vec<bool> = bends.map(|bend| bend > shading.crease_angle).collect();
+        let mut sharp_vertices = vec![false; mesh.vertices().len()];
+        for (edge, _) in mesh
+            .edges()
+            .iter()
+            .zip(&creases)
+            .filter(|(_, crease)| **crease)
+        {
+            for vertex in edge.vertices {
+                sharp_vertices[vertex as usize] = true;
+            }
+        }
+        Some(Self {
+            corners: corner_normals(mesh, shading.crease_angle),
+            creases,
+            sharp_vertices,
         })
     }
 
-    /// The unit normal at a point of `triangle`, world axes, on the same side as `true_normal`.
+    /// The unit normal at a point of `feature` in `triangle`, world axes, on the same side as `true_normal`.
     ///
-    /// `None` when the interpolated normal is degenerate or turns away from the true one.
+    /// `None` on creases and their ends, whose normal is that of the contact and of neither side; and when the interpolated normal is degenerate or
+    /// turns away from the true one.
     pub fn at(
         &self,
         obstacle: &Obstacle,
-        triangle: u32,
+        (feature, triangle): (Feature, u32),
         barycentric: &[f64; 3],
         true_normal: &Vector3<f64>,
     ) -> Option<Vector3<f64>> {
+        let sharp = match feature {
+            Feature::Edge(e) => *self.creases.get(e as usize)?,
+            Feature::Vertex(v) => *self.sharp_vertices.get(v as usize)?,
+            _ => false,
+        };
+        if sharp {
+            return None;
+        }
         let corners = self.corners.get(triangle as usize)?;
         let sum = corners
             .iter()
