@@ -1,7 +1,8 @@
 //! A hand that stands still feels a force that stands still, and a scene that is turned as a whole feels the same: every shape on every other, at poses
 //! that nobody chose.
 //!
-//! `cargo test -p taut-method-tests still_hand -- --ignored` takes many more poses, some ten minutes.
+//! `cargo test -p taut-method-tests still_hand -- --ignored --nocapture` takes many more poses, some seven minutes, and fails: it names those at which the force is
+//! not still, which `docs/how-it-works.md` tells of.
 
 use std::path::Path;
 
@@ -288,7 +289,7 @@ fn a_scene_turned_as_a_whole_feels_the_same() {
 }
 
 #[test]
-#[ignore = "ten minutes"]
+#[ignore = "seven minutes, and names what is not mended"]
 fn all_of_it_at_many_poses() {
     let (landed, wedged) = (landed(0..40), wedged(0..40));
     println!("{:#?} {:#?}", landed.found, wedged.found);
