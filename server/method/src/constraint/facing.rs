@@ -23,8 +23,8 @@ use crate::geometry::distance::barycentric;
 /// How far outside both normal cones the direction may lie, rad: bodies that rest flat on each other do so to about a
 /// micrometre over their size. A ghost slope of 1e-4 is below anything felt.
 pub(crate) const NORMAL_CONE_TOLERANCE: f64 = 1e-4;
-/// The same, rad, for pairs whose row is true however the body is tilted: a corner over a face, which keeps the face's normal, and edges and rims that
-/// cross, which cannot pass each other without meeting. Their rows are there before the body tilts onto them, so that it rests on both of two edges.
+/// The same, rad, for pairs whose row is true however the body is tilted: a corner over a face, which keeps the face's normal, or on a round
+/// side, and edges and rims that cross, which cannot pass each other without meeting. Their rows are there before the body tilts onto them, so that it rests on both of two edges.
 pub(crate) const LOOK_AHEAD_TILT: f64 = 0.02;
 /// How far outside a face a foot may lie: per gap (rad), it covers the wedges over flat edges and then some; per side, rounding.
 const FOOT_TOLERANCE_PER_GAP: f64 = NORMAL_CONE_TOLERANCE;
