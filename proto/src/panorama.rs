@@ -112,13 +112,15 @@ mod tests {
     proptest! {
         #[test]
         fn light_survives_up_to_half_a_step_of_the_brightest(
-            light in prop::array::uniform3(0.0..60_000.0_f32), dim in 0..30,
+            light in prop::array::uniform3(0.0..60_000.0_f32), dim in 0..45,
         ) {
             let light = light.map(|part| part * 0.5f32.powi(dim));
             let found = light_of(shared_exponent(light));
-            let peak = light.iter().copied().fold(1e-6, f32::max);
+            let peak = light.iter().copied().fold(0.0, f32::max);
+            // The brightest is at least 255.75 steps, where it was rounded up to 256, unless the smallest step is too large for it.
+            let half_a_step = (peak / 511.0).max(0.5 * light_of(1)[0]);
             for (a, b) in light.iter().zip(found) {
-                prop_assert!((a - b).abs() <= peak / 500.0, "{light:?} {found:?}");
+                prop_assert!((a - b).abs() <= half_a_step, "{light:?} {found:?}");
             }
         }
 
