@@ -3,8 +3,8 @@
 //! Each contact: `0 <= lambda_n  _|_  J_n a - b >= 0`, and its tangential multiplier is the point of the disc of radius
 //! `mu lambda_n` that opposes its slip most (maximal dissipation; exact circles, so no direction is preferred). The rows are
 //! more than the six unknowns, and the share of each contact is not unique: the start is the least-norm distribution, as of
-//! an elastic foundation, which neither order nor duplication of the rows changes: of what full stick needs, and where a cone forbids that, of
-//! the answer before. The iteration goes on from there.
+//! an elastic foundation, which neither order nor duplication of the rows changes, of what full stick needs. Where a cone forbids that, it is what the
+//! contacts carried before, and the least-norm distribution of what they lack of the correction before. The iteration goes on from there.
 //!
 //! Source: the contact laws are those of Moreau and Jean's non-smooth contact dynamics (Jean 1999), with displacements for velocities.
 
@@ -44,6 +44,7 @@ impl ConeProblem {
     /// Where the Newton iteration comes to its limit, full stick cut to the cones stays, and a residual that says how much was cut.
     pub(super) fn solve(&mut self, scale: f64, likely: &Vector6) -> ConeAnswer {
         let held = Held::by(&self.contacts);
+        let before = self.contacts.clone();
         let cut = self.start_from_stick(held.as_ref());
         if cut <= STICK_TOLERANCE * scale {
             return ConeAnswer {
@@ -51,8 +52,10 @@ impl ConeProblem {
                 residual: 0.0,
             };
         }
+        self.contacts = before;
         if let Some(held) = &held {
-            self.share(&held.solve(likely));
+            let lacking = likely - self.wrench();
+            self.share(&held.solve(&lacking));
         }
         let residual = self.balance(scale, likely);
         if residual.is_none() {
@@ -87,6 +90,9 @@ impl ConeProblem {
                 sum
             }
         });
+        for contact in &mut self.contacts {
+            (contact.load, contact.grip) = (0.0, [0.0; 2]);
+        }
         let cut = self.share(&held.solve(&held.solve(&wanted)));
         // What no contact can hold (contacts that contradict each other) counts as cut, too.
         let y = self.wrench();
@@ -96,16 +102,16 @@ impl ConeProblem {
         cut.norm() + missed
     }
 
-    /// Gives every contact `j . shares`, cut to its cone. Returns the wrench that was cut.
+    /// Gives every contact `j . shares` more, cut to its cone. Returns the wrench that was cut.
     fn share(&mut self, shares: &Vector6) -> Vector6 {
         let mut cut = Vector6::zeros();
         for contact in &mut self.contacts {
-            let wished_load = contact.normal.dot(shares);
+            let wished_load = contact.load + contact.normal.dot(shares);
             contact.load = wished_load.max(0.0);
             cut += contact.normal * (contact.load - wished_load);
             let frictional = contact.coefficient > 0.0;
             let wished = if frictional {
-                contact.tangents.map(|j| j.dot(shares))
+                [0, 1].map(|i| contact.grip[i] + contact.tangents[i].dot(shares))
             } else {
                 [0.0; 2]
             };

@@ -195,6 +195,31 @@ fn most_problems_balance_within_the_limit() {
 }
 
 #[test]
+fn contacts_carry_what_they_carried_where_nothing_changes() {
+    let mut runner = TestRunner::deterministic();
+    let problems = (wished(), contacts(MAX_CONE_CONTACTS));
+    let (mut slipping, mut changed) = (0, 0);
+    for _ in 0..2000 {
+        let drawn = problems.new_tree(&mut runner).expect("no filter");
+        let (wished, contacts) = drawn.current();
+        let scale = wished.norm();
+        let (mut problem, first) =
+            solved(&problem(0.2, &wished, &contacts), Vector6::zeros(), scale);
+        // Full stick, without a residual, has a distribution of its own.
+        if first.residual > 0.0 && first.residual <= NO_RESIDUAL {
+            let before = problem.contacts.clone();
+            problem.solve(scale, &first.correction);
+            let mut pairs = problem.contacts.iter().zip(&before);
+            let change =
+                |(now, before): (&ConeContact, &ConeContact)| now.wrench() - before.wrench();
+            slipping += 1;
+            changed += u32::from(pairs.any(|pair| change(pair).norm() > 1e-3 * scale));
+        }
+    }
+    assert!(slipping > 1000 && changed == 0, "{changed} of {slipping}");
+}
+
+#[test]
 fn a_contact_that_stands_on_its_edge_of_slipping_holds_what_its_cone_holds() {
     // 1 N s^2 of load, mu = 0.5, and a tangential wish on either side of the limit.
     for wish in [0.49, 0.5, 0.51, 2.0] {

@@ -12,13 +12,13 @@ use nalgebra::{Point3, Vector3};
 
 use super::carried::Carried;
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
-use super::contact::{ConeContact, tangents_of};
-use crate::constraint::{FeaturePair, NonPenetrationConstraint, contact_jacobian};
+use super::selection::ContactRow;
+use crate::constraint::NonPenetrationConstraint;
 use crate::quasi_statics::{
     HalfSpace, MAX_ACTIVE, Metric, Projection, ProjectionStatus, Projector,
 };
 use crate::settings::Settings;
-use crate::spatial::{Pose, Vector6, linear, six};
+use crate::spatial::{Pose, Vector6, six};
 use crate::world::World;
 
 /// A contact touches when its row is this near to equality, in motion tolerances: gaps at rest differ by as much.
@@ -32,18 +32,15 @@ const MAX_HALVINGS: usize = 3;
 #[derive(Clone, Debug)]
 pub struct Friction {
     /// Coefficient of each obstacle.
-    coefficients: Vec<f64>,
-    touching: f64,
+    pub(super) coefficients: Vec<f64>,
+    pub(super) touching: f64,
     /// Rows that touch.
-    touched: Vec<u32>,
-    cone: ConeProblem,
-    /// The rows of the cone problem's contacts, in their order, and their features.
-    rows: ArrayVec<u32, MAX_CONE_CONTACTS>,
-    features: ArrayVec<FeaturePair, MAX_CONE_CONTACTS>,
-    /// Their bounds in both problems, m.
-    bounds: ArrayVec<f64, MAX_CONE_CONTACTS>,
+    pub(super) touched: Vec<u32>,
+    pub(super) cone: ConeProblem,
+    /// The rows of the cone problem's contacts, in their order.
+    pub(super) rows: ArrayVec<ContactRow, MAX_CONE_CONTACTS>,
     /// `L^T (a - a_u)` of the last cone problem: the next one's may be near.
-    last: Vector6,
+    pub(super) last: Vector6,
     residual: f64,
     /// Length in the metric that the residual is relative to, m kg^(1/2).
     scale: f64,
@@ -81,7 +78,7 @@ impl FrictionProblem<'_> {
     }
 
     /// Contact point of a row, world, m.
-    fn point(&self, constraint: &NonPenetrationConstraint) -> Point3<f64> {
+    pub(super) fn point(&self, constraint: &NonPenetrationConstraint) -> Point3<f64> {
         self.moved.map_or(constraint.point, |(start, at, shaded)| {
             constraint.moved(start, at, shaded).point
         })
@@ -106,8 +103,6 @@ impl Friction {
             touched: Vec::with_capacity(settings.max_constraints),
             cone: ConeProblem::default(),
             rows: ArrayVec::new(),
-            features: ArrayVec::new(),
-            bounds: ArrayVec::new(),
             last: Vector6::zeros(),
             residual: 0.0,
             scale: 0.0,
@@ -155,7 +150,7 @@ impl Friction {
     pub(crate) fn holding(&self) -> impl Iterator<Item = u32> + '_ {
         let contacts = self.rows.iter().zip(&self.cone.contacts);
         let loaded = contacts.filter(|(_, contact)| self.acts && contact.load > 0.0);
-        loaded.map(|(row, _)| *row)
+        loaded.map(|(row, _)| row.index)
     }
 
     /// What the last answer's tangential multipliers do over the ways that obstacles made in the set's update, kg m^2.
@@ -167,7 +162,7 @@ impl Friction {
     }
 
     /// Adds friction to `frictionless`, the projection of the same problem. Without a frictional contact that carries
-    /// load it is returned unchanged, bit for bit. `projector` has the problem's rows prepared, and has them again afterwards.
+    /// load it is returned unchanged, bit for bit. `projector` has the problem's rows prepared.
     pub fn hold(
         &mut self,
         problem: &FrictionProblem<'_>,
@@ -178,7 +173,7 @@ impl Friction {
         self.slid = true;
         self.acts = false;
         if frictionless.status != ProjectionStatus::Solved || frictionless.active.is_empty() {
-            self.last = Vector6::zeros();
+            self.forget();
             return frictionless;
         }
         let metric = problem.metric;
@@ -192,7 +187,7 @@ impl Friction {
         }
         self.scale = scale;
         if !self.gather(problem, &frictionless) {
-            self.last = Vector6::zeros();
+            self.forget();
             return frictionless;
         }
         if self.last == Vector6::zeros() {
@@ -200,7 +195,7 @@ impl Friction {
         }
         let mut answer = self.cone.solve(scale, &self.last);
         for _ in 0..MAX_ADDED {
-            if !self.add_violated(problem, &frictionless, &answer.correction) {
+            if !self.add_violated(problem, &answer.correction) {
                 break;
             }
             answer = self.cone.solve_again(scale, &answer);
@@ -208,15 +203,7 @@ impl Friction {
         self.last = answer.correction;
         let active: ArrayVec<u32, MAX_ACTIVE> =
             frictionless.active.iter().map(|row| row.row).collect();
-        // One problem, solved twice: a contact has the same bound in both.
-        for (row, bound) in self.rows.iter().zip(&self.bounds) {
-            projector.set_bound(*row as usize, *bound);
-        }
         let held = self.project_with_grip(problem, &active, projector);
-        for &row in &self.rows {
-            let row = row as usize;
-            projector.set_bound(row, problem.rows[row].bound);
-        }
         let Some((projection, correction)) = held else {
             self.residual = f64::INFINITY;
             return frictionless;
@@ -226,129 +213,11 @@ impl Friction {
         projection
     }
 
-    /// Makes the row that the correction violates most a contact, if by more than what touching contacts may differ; whether there is one and room for it.
-    fn add_violated(
-        &mut self,
-        problem: &FrictionProblem<'_>,
-        frictionless: &Projection,
-        correction: &Vector6,
-    ) -> bool {
-        let acceleration = problem.unconstrained + problem.metric.unwhiten(correction);
-        let slacks = problem.rows.iter().map(|row| row.slack(&acceleration));
-        let rows = slacks
-            .enumerate()
-            .filter(|(_, slack)| *slack < -self.touching);
-        let deepest = rows.min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((index, _)) = deepest.filter(|(k, _)| !self.rows.contains(&(*k as u32))) else {
-            return false;
-        };
-        if self.rows.is_full() {
-            let Some(idle) = self.cone.contacts.iter().position(|c| c.load <= 0.0) else {
-                return false;
-            };
-            self.rows.swap_remove(idle);
-            self.features.swap_remove(idle);
-            self.bounds.swap_remove(idle);
-            self.cone.contacts.swap_remove(idle);
-        }
-        self.add(problem, frictionless, index as u32)
-    }
-
-    /// Fills the cone problem with the contacts that touch at the frictionless answer. False when none of them is frictional.
-    fn gather(&mut self, problem: &FrictionProblem<'_>, now: &Projection) -> bool {
-        let contacts = self.features.iter().zip(&self.cone.contacts);
-        let loaded = contacts.filter(|(_, contact)| contact.load > 0.0);
-        let loaded: ArrayVec<FeaturePair, MAX_CONE_CONTACTS> =
-            loaded.map(|(pair, _)| *pair).collect();
+    /// The next contact finds nothing of those before.
+    fn forget(&mut self) {
         self.cone.contacts.clear();
         self.rows.clear();
-        self.features.clear();
-        self.bounds.clear();
-        self.touched.clear();
-        let mut frictional = false;
-        // What touched with friction a moment ago most likely does so again.
-        let before = problem.unconstrained + problem.metric.unwhiten(&self.last);
-        let rows = problem.rows.iter().zip(problem.constraints);
-        for (index, (row, constraint)) in rows.enumerate() {
-            let slack = row.slack(&now.acceleration).min(row.slack(&before));
-            let touches = slack <= self.touching;
-            if touches && self.touched.len() < self.touched.capacity() {
-                self.touched.push(index as u32);
-                frictional |= self.coefficient_of(constraint) > 0.0;
-            }
-        }
-        if !frictional {
-            return false;
-        }
-        // More contacts than the cone problem takes: those that hold the body now and those that did so a moment ago, then every n-th of the others.
-        let count = self.touched.len();
-        let stride = if count <= MAX_CONE_CONTACTS {
-            1
-        } else {
-            for active in &now.active {
-                self.add(problem, now, active.row);
-            }
-            for k in 0..count {
-                let index = self.touched[k];
-                if loaded.contains(&problem.constraints[index as usize].features) {
-                    self.add(problem, now, index);
-                }
-            }
-            count.div_ceil(MAX_CONE_CONTACTS - now.active.len())
-        };
-        for k in (0..count).step_by(stride) {
-            self.add(problem, now, self.touched[k]);
-        }
-        !self.rows.is_empty()
-    }
-
-    fn coefficient_of(&self, constraint: &NonPenetrationConstraint) -> f64 {
-        let obstacle = usize::from(constraint.features.obstacle);
-        self.coefficients.get(obstacle).copied().unwrap_or(0.0)
-    }
-
-    /// Makes a row a contact without load, if there is room; whether it is a new one.
-    fn add(&mut self, problem: &FrictionProblem<'_>, now: &Projection, index: u32) -> bool {
-        let at = index as usize;
-        let (Some(row), Some(constraint)) = (problem.rows.get(at), problem.constraints.get(at))
-        else {
-            return false;
-        };
-        if self.rows.contains(&index) || self.rows.is_full() {
-            return false;
-        }
-        let metric = problem.metric;
-        let point = problem.point(constraint);
-        let point_row = |direction| contact_jacobian(&direction, &point, problem.reference_point);
-        let directions = tangents_of(&linear(&row.jacobian));
-        let tangents = directions.map(point_row);
-        let carried = problem.carried.of(constraint);
-        let normal = metric.whiten_row(&row.jacobian);
-        // Touching is touching: what touches where the body sticks does so exactly, or it would not be at rest there; or else where the body goes
-        // without friction.
-        let touches = |a: &Vector6| row.slack(a).abs() <= self.touching;
-        let touching_at = [problem.stuck_at, &now.acceleration];
-        let bound = touching_at
-            .into_iter()
-            .find(|a| touches(a))
-            .map_or(row.bound, |a| row.jacobian.dot(a));
-        let wished = problem.unconstrained - problem.stuck_at;
-        let contact = ConeContact::new(
-            self.coefficient_of(constraint),
-            normal,
-            tangents.map(|j| metric.whiten_row(&j)),
-            row.jacobian.dot(problem.unconstrained) - bound,
-            [0, 1].map(|i| tangents[i].dot(&wished) - directions[i].dot(&carried)),
-            directions.map(|t| t.dot(&constraint.obstacle_displacement)),
-        );
-        let Some(contact) = contact else {
-            return false;
-        };
-        self.cone.contacts.push(contact);
-        self.rows.push(index);
-        self.features.push(constraint.features);
-        self.bounds.push(bound);
-        true
+        self.last = Vector6::zeros();
     }
 
     /// Eq. (1) once more, with the cone problem's tangential wrench in a_u; with its `L^T (a_c - a_u)`.

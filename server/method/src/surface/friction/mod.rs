@@ -8,6 +8,7 @@ mod cone_tests;
 mod contact;
 mod hold;
 mod newton;
+mod selection;
 
 pub(crate) use anchor::StickAnchor;
 pub use carried::Carried;

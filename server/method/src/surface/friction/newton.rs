@@ -37,11 +37,10 @@ const NO_SLIP: f64 = 1e-6;
 /// Forces balance when this share of the scale is left.
 const BALANCE_TOLERANCE: f64 = 1e-6;
 
-/// A linear system for the next y: six rows, and their right sides.
-struct System {
-    rows: [Lanes8; 6],
-    right: Lanes8,
-}
+/// A linear system for the next y: six rows, with their right sides in the lane after the sixth.
+struct System([Lanes8; 6]);
+
+const RIGHT: usize = 6;
 
 /// The rows of a contact, padded.
 #[derive(Clone, Copy, Debug)]
@@ -184,29 +183,23 @@ impl System {
         for (k, row) in rows.iter_mut().enumerate() {
             row[k] = 1.0;
         }
-        Self {
-            rows,
-            right: [0.0; 8],
-        }
+        Self(rows)
     }
 
     /// Adds `rate a b^T` to the rows, and `a right` to their right sides.
     #[inline(always)]
     fn add_product(&mut self, a: &Lanes8, b: &Lanes8, rate: f64, right: f64) {
-        let b = scaled(b, rate);
-        for (row, x) in self.rows.iter_mut().zip(a) {
+        let mut b = scaled(b, rate);
+        b[RIGHT] = right;
+        for (row, x) in self.0.iter_mut().zip(a) {
             *row = add_scaled(row, &b, *x);
         }
-        self.right = add_scaled(&self.right, a, right);
     }
 
-    /// Gaussian elimination with the largest of each column; `None` for a singular system, and for NaN.
+    /// Gauss-Jordan elimination with the largest of each column; `None` for a singular system, and for NaN.
     #[inline(always)]
     fn solved(self) -> Option<Lanes8> {
-        let Self {
-            mut rows,
-            mut right,
-        } = self;
+        let Self(mut rows) = self;
         for k in 0..6 {
             let mut largest = k;
             for i in k + 1..6 {
@@ -214,26 +207,20 @@ impl System {
                     largest = i;
                 }
             }
-            if largest != k {
-                rows.swap(k, largest);
-                right.swap(k, largest);
-            }
-            let pivot = rows[k];
-            let regular = pivot[k].abs() > 0.0; // false for NaN
+            rows.swap(k, largest);
+            let regular = rows[k][k].abs() > 0.0; // false for NaN
             if !regular {
                 return None;
             }
-            let inverse = 1.0 / pivot[k];
-            for i in k + 1..6 {
-                let share = rows[i][k] * inverse;
-                rows[i] = add_scaled(&rows[i], &pivot, -share);
-                right[i] -= right[k] * share;
+            rows[k] = scaled(&rows[k], 1.0 / rows[k][k]);
+            let pivot = rows[k];
+            for i in (0..6).filter(|i| *i != k) {
+                rows[i] = add_scaled(&rows[i], &pivot, -rows[i][k]);
             }
         }
         let mut y = [0.0; 8];
-        for k in (0..6).rev() {
-            let known: f64 = (k + 1..6).map(|i| rows[k][i] * y[i]).sum();
-            y[k] = (right[k] - known) / rows[k][k];
+        for (y, row) in y.iter_mut().zip(&rows) {
+            *y = row[RIGHT];
         }
         Some(y)
     }
