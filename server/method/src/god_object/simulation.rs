@@ -42,8 +42,8 @@ pub struct GodObject {
     pub(super) turn: TurnMemory,
     pub(super) radius: f64,
     pub(super) trust_length: f64,
-    /// What the last update's motions showed, for the next one: where the hand rests, updates go on from each other.
-    pub(super) step_memory: StepMemory,
+    /// The last update's motion, and how much of its way the next one makes, where the hand rests.
+    pub(super) rest_memory: StepMemory,
     pub(super) last_device: Option<Pose>,
     /// Motion of the device since the update before, m and rad.
     pub(super) device_step: Vector6,
@@ -114,7 +114,7 @@ impl GodObject {
             turn: TurnMemory::default(),
             radius,
             trust_length: f64::INFINITY,
-            step_memory: StepMemory::default(),
+            rest_memory: StepMemory::default(),
             last_device: None,
             device_step: Vector6::zeros(),
             wanted: settings.activation_distance,
@@ -174,7 +174,6 @@ impl GodObject {
             Some(pass) if pass.sequence == self.set.sequence => pass.acceleration,
             _ => difference * self.settings.k_s,
         };
-        let goal = advance_pose(&start, &unconstrained, 1.0);
         let last = self.last_device.replace(device).unwrap_or(device);
         self.device_step = pose_difference(&device, &last, &Vector3::zeros());
         let device_moved = self.motion_length(&self.device_step) + self.device_ahead;
@@ -182,6 +181,15 @@ impl GodObject {
         // What moves by itself comes first: the body is out of its way before it follows the hand.
         let obstacles_moved = self.carry_obstacles(&mut report);
         self.begin_carry(&start);
+
+        // Where the hand rests, an update that turns back on the last says that the last went too far: sub-steps make the whole way to their goal,
+        // so the goal is what comes nearer.
+        let rests = device_moved + obstacles_moved <= self.settings.rest_distance;
+        if !rests {
+            self.rest_memory = StepMemory::default();
+        }
+        let unconstrained = unconstrained * self.rest_memory.damping();
+        let goal = advance_pose(&start, &unconstrained, 1.0);
 
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
         let mut branch = angular(&unconstrained);
@@ -191,11 +199,7 @@ impl GodObject {
             moved: all_moved - self.device_ahead,
             look_ahead: all_moved,
             made: 0.0,
-            step_memory: if all_moved <= self.settings.rest_distance {
-                self.step_memory
-            } else {
-                StepMemory::default()
-            },
+            step_memory: StepMemory::default(),
             reversals: 0,
         };
         report.unfinished = true;
@@ -215,7 +219,10 @@ impl GodObject {
                 break;
             }
         }
-        self.step_memory = update.step_memory;
+        let made = pose_difference(&self.pose_at_reference_point(), &start, &Vector3::zeros());
+        if rests && self.motion_length(&made) > self.settings.motion_tolerance {
+            self.rest_memory.relax(&made, self.radius);
+        }
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
         let published = self.published_distance(&update);
         if self.collected_within < published {

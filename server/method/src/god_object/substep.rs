@@ -48,8 +48,8 @@ pub(super) struct Update {
     pub(super) reversals: u32,
 }
 
-/// What one motion says about the next. Where the hand rests it outlives the update: motions that turn back on each other would else
-/// do the same in every update, and end in a cycle instead of at the minimum.
+/// What one motion says about the next: of the sub-steps of an update, and of whole updates where the hand rests. Motions that turn back on each
+/// other would else do the same in every update, and end in a cycle instead of at the minimum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StepMemory {
     /// Motion of the sub-step before.
@@ -88,9 +88,9 @@ impl GodObject {
         };
         let covered = self.motion_length(&projected.acceleration);
         if report.substeps == 1 {
-            // This update covers the share k_s of what is free, the next sets must serve the rest.
-            update.look_ahead =
-                update.all_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
+            // This update covers a share of what is free, the next sets must serve the rest.
+            let share = self.settings.k_s * self.rest_memory.damping();
+            update.look_ahead = update.all_moved + covered * (1.0 - share) / share;
         }
         // Projections are non-expansive: of motions up to the device's own, the last one is no cause.
         let follows = update.made == 0.0 && covered <= update.moved;
@@ -245,9 +245,13 @@ impl GodObject {
 }
 
 impl StepMemory {
+    pub(super) fn damping(&self) -> f64 {
+        self.damping
+    }
+
     /// Takes note of a projected motion, before it is made: one that turns back on the last, for which this is true, says that the last went
     /// too far.
-    fn relax(&mut self, motion: &Vector6, radius: f64) -> bool {
+    pub(super) fn relax(&mut self, motion: &Vector6, radius: f64) -> bool {
         let weighed = |a: &Vector6, b: &Vector6| {
             linear(a).dot(&linear(b)) + radius * radius * angular(a).dot(&angular(b))
         };
