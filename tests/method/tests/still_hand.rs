@@ -1,8 +1,7 @@
 //! A hand that stands still feels a force that stands still, and a scene that is turned as a whole feels the same: every shape on every other, at poses
 //! that nobody chose.
 //!
-//! `cargo test -p taut-method-tests still_hand -- --ignored --nocapture` takes many more poses, some seven minutes, and fails: it names those at which the force is
-//! not still, which `docs/how-it-works.md` tells of.
+//! `cargo test -p taut-method-tests still_hand -- --ignored --nocapture` takes many more poses, some seven minutes.
 
 use std::path::Path;
 
@@ -274,7 +273,7 @@ fn turns(poses: impl Iterator<Item = u64> + Clone) -> f64 {
 
 #[test]
 fn a_body_pressed_on_another_comes_to_rest() {
-    landed([4, 13, 31_689, 55_446].into_iter()).are_none();
+    landed([1, 4, 13, 31_689, 55_446].into_iter()).are_none();
 }
 
 #[test]
@@ -289,7 +288,7 @@ fn a_scene_turned_as_a_whole_feels_the_same() {
 }
 
 #[test]
-#[ignore = "seven minutes, and names what is not mended"]
+#[ignore = "seven minutes: the same at many more poses"]
 fn all_of_it_at_many_poses() {
     let (landed, wedged) = (landed(0..40), wedged(0..40));
     println!("{:#?} {:#?}", landed.found, wedged.found);

@@ -271,6 +271,11 @@ impl GodObject {
             }
             projected = self.project(unconstrained, ahead, report)?;
         }
+        if led_elsewhere && let Some(reduction) = &mut self.reduction {
+            for row in &self.warm_start {
+                reduction.use_row(&self.set.constraints[*row as usize].features);
+            }
+        }
         Some(projected)
     }
 

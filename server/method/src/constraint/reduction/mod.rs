@@ -430,6 +430,14 @@ impl RowReduction {
         true
     }
 
+    /// A row holds the body in an answer that was found elsewhere: friction leads to others than the wish alone.
+    pub(crate) fn use_row(&mut self, features: &FeaturePair) {
+        let mut rows = self.known.iter_mut();
+        if let Some(row) = rows.find(|row| row.contact.features == *features) {
+            row.idle = 0;
+        }
+    }
+
     /// An update has ended: rows that were of no use for long are let go.
     pub(crate) fn retire(&mut self) {
         self.known.iter_mut().for_each(|row| row.idle += 1);
