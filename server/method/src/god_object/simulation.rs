@@ -184,8 +184,7 @@ impl GodObject {
 
         // Where the hand rests, an update that turns back on the last says that the last went too far: sub-steps make the whole way to their goal,
         // so the goal is what comes nearer.
-        let rests = device_moved + obstacles_moved <= self.settings.rest_distance;
-        if !rests {
+        if device_moved + obstacles_moved > self.settings.rest_distance {
             self.rest_memory = StepMemory::default();
         }
         let unconstrained = unconstrained * self.rest_memory.damping();
@@ -220,8 +219,11 @@ impl GodObject {
             }
         }
         let made = pose_difference(&self.pose_at_reference_point(), &start, &Vector3::zeros());
-        if rests && self.motion_length(&made) > self.settings.motion_tolerance {
+        if self.motion_length(&made) > self.settings.motion_tolerance {
             self.rest_memory.relax(&made, self.radius);
+        } else {
+            // A goal so near that nothing moves would keep the body where it is, short of its minimum.
+            self.rest_memory.grow();
         }
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
         let published = self.published_distance(&update);

@@ -52,7 +52,7 @@ pub(super) struct Update {
 /// other would else do the same in every update, and end in a cycle instead of at the minimum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StepMemory {
-    /// Motion of the sub-step before.
+    /// Motion of the sub-step or of the update before.
     last_motion: Vector6,
     /// Share of the projected motion that is made; shrinks while motions turn back on each other.
     damping: f64,
@@ -262,10 +262,14 @@ impl StepMemory {
             let ratio = along / weighed(&self.last_motion, &self.last_motion);
             self.damping /= (1.0 - ratio).min(LARGEST_DAMPING);
         } else if along > 0.0 {
-            // By twice, and not at once: a peg at the mouth of its hole would go to and fro, and stay there.
-            self.damping = (2.0 * self.damping).min(1.0);
+            self.grow();
         }
         self.last_motion = *motion;
         turns_back
+    }
+
+    /// The next motion makes twice the share, and not at once all: a peg at the mouth of its hole would go to and fro, and stay there.
+    pub(super) fn grow(&mut self) {
+        self.damping = (2.0 * self.damping).min(1.0);
     }
 }
