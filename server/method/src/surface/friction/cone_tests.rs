@@ -135,27 +135,24 @@ proptest! {
     }
 
     #[test]
-    fn the_answer_is_that_of_relaxation_without_end(
-        wished in wished(), contacts in contacts(2), coefficient in 0.0..0.4_f64,
+    fn relaxation_without_end_stays_with_the_answer(
+        wished in wished(), contacts in contacts(4), coefficient in 0.0..0.4_f64, start in prop::array::uniform6(-0.5..0.5_f64),
     ) {
         let scale = wished.norm();
-        let problem = problem(coefficient, &wished, &contacts);
-        let (_, answer) = solved(&problem, Vector6::zeros(), scale);
+        let (solved, answer) = solved(&problem(coefficient, &wished, &contacts), Vector6::from(start), scale);
         let balanced = answer.residual <= BALANCED;
-        if balanced && let Some(expected) = oracle(problem) {
-            let error = (answer.correction - expected).norm() / scale;
+        if balanced && let Some(relaxed) = oracle(solved) {
+            let error = (answer.correction - relaxed).norm() / scale;
             prop_assert!(error <= AMPLIFIED * answer.residual.max(NO_RESIDUAL), "{error} {}", answer.residual);
         }
     }
 
     #[test]
-    fn neither_start_nor_order_of_contacts_changes_the_answer(
-        wished in wished(), contacts in contacts(MAX_CONE_CONTACTS), start in prop::array::uniform6(-0.5..0.5_f64),
-    ) {
+    fn the_order_of_contacts_changes_nothing(wished in wished(), contacts in contacts(MAX_CONE_CONTACTS)) {
         let scale = wished.norm();
         let (_, one) = solved(&problem(0.2, &wished, &contacts), Vector6::zeros(), scale);
         let turned: Vec<_> = contacts.iter().rev().copied().collect();
-        let (_, other) = solved(&problem(0.2, &wished, &turned), Vector6::from(start), scale);
+        let (_, other) = solved(&problem(0.2, &wished, &turned), Vector6::zeros(), scale);
         let residual = one.residual.max(other.residual);
         if residual <= BALANCED {
             let difference = (one.correction - other.correction).norm() / scale;
@@ -217,6 +214,30 @@ fn contacts_carry_what_they_carried_where_nothing_changes() {
         }
     }
     assert!(slipping > 1000 && changed == 0, "{changed} of {slipping}");
+}
+
+/// Slip does not lift the body, though the cone's normal would have it so: Coulomb's law has no potential, and may have two answers.
+#[test]
+fn where_two_answers_keep_the_law_the_start_decides() {
+    let wished = Vector6::new(
+        -0.46071, -0.830235, -0.196207, -0.789724, 0.135751, -0.842588,
+    );
+    let contacts = [
+        ([-0.483786, 0.616612, -0.2], [0.263996, 0.406145, 1.5]),
+        ([-0.931318, 0.906294, -0.2], [0.461333, 0.484249, 1.5]),
+        ([0.755807, 0.080986, -0.2], [-0.096016, 0.511197, 1.5]),
+    ]
+    .map(|(point, normal)| (Vector3::from(point), Vector3::from(normal)));
+    let problem = problem(0.2, &wished, &contacts);
+    let scale = wished.norm();
+    let [one, other] = [0.0, 0.375].map(|z| {
+        let start = Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0);
+        let (solved, answer) = solved(&problem, start, scale);
+        let relaxed = oracle(solved).expect("it comes to an end");
+        assert!((answer.correction - relaxed).norm() <= AMPLIFIED * NO_RESIDUAL * scale);
+        relaxed
+    });
+    assert!((one - other).norm() > 0.01 * scale, "{one} {other}");
 }
 
 #[test]
