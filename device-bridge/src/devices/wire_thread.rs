@@ -8,7 +8,8 @@
 //!
 //! No command outlives its reason: from [`HOLDS`] after the last write of the device's loop on [`Line::command`] has none, and a session's last
 //! word is zero. A driver that has let go, or begins a session anew, renders nothing until the device's loop knows of it
-//! once more ([`WireThread::let_go`]): the next command was made for a hand that feels the last one, and would be a blow.
+//! once more ([`WireThread::let_go`]): the next command was made for a hand that feels the last one, and would be a blow. The same holds where the
+//! driver's own thread has stood for longer than [`HOLDS`]: the device's watchdog has let go in its place.
 
 use std::fmt::Display;
 use std::sync::Arc;
@@ -20,7 +21,7 @@ use super::arm::{ArmPort, ArmState};
 use super::pace::Pace;
 use crate::realtime::{self, monotonic_now};
 
-/// From the last write of the device's loop on nothing is commanded any more.
+/// From the last write of the device's loop on nothing is commanded any more; and a device that hears nothing for longer may have ended the force.
 pub(crate) const HOLDS: Duration = Duration::from_millis(20);
 /// Between two sessions.
 const RETRY: Duration = Duration::from_millis(200);
@@ -80,6 +81,8 @@ pub(crate) struct Line<S: Send, C: Send> {
     wanted: triple_buffer::Output<Written<C>>,
     /// Writes of the device's loop, and when the last was seen.
     seen: (u64, Duration),
+    /// When the driver asked for a command last in this session.
+    turned: Option<Duration>,
     /// Of this session, where a state answers each command.
     pace: Option<Pace>,
     /// When the command was taken that the next state answers.
@@ -122,8 +125,10 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
     /// The same for a driver that can render only while `can_render`; it lets go where it cannot.
     pub(crate) fn command_if(&mut self, now: Duration, can_render: bool) -> Option<C> {
         self.asked = Some(now);
+        let turned = self.turned.replace(now).unwrap_or(now);
+        let stood = now.saturating_sub(turned) > HOLDS;
         // Nobody has rendered what was commanded until now, whatever the device's loop was told before: it is told once more.
-        let missed = std::mem::take(&mut self.missed) || !can_render;
+        let missed = std::mem::take(&mut self.missed) || stood || !can_render;
         self.renders |= missed;
         let wanted = *self.wanted.read();
         if wanted.writes != self.seen.0 {
@@ -169,14 +174,8 @@ pub(crate) struct WireThread<S: Send, C: Send> {
 }
 
 impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
-    /// Runs `wire` in a thread called `thread`. `priority` asks for real time, 0 does not.
-    ///
-    /// # Errors
-    /// The system has no thread.
-    pub(crate) fn start<W>(thread: &str, priority: u8, wire: W) -> std::io::Result<Self>
-    where
-        W: Wire<State = S, Command = C>,
-    {
+    /// Both ends, without a thread.
+    fn ends(name: String) -> (Self, Line<S, C>) {
         let (out, newest) = triple_buffer::TripleBuffer::new(&S::default()).split();
         let (wanted, taken) = triple_buffer::TripleBuffer::new(&Written::default()).split();
         let end = Arc::new(AtomicBool::new(false));
@@ -186,6 +185,7 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             out,
             wanted: taken,
             seen: (0, Duration::ZERO),
+            turned: None,
             pace: None,
             asked: None,
             let_go: Arc::clone(&let_go),
@@ -193,22 +193,35 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             missed: false,
             end: Arc::clone(&end),
         };
-        let name = wire.name();
-        let thread = thread::Builder::new()
-            .name(thread.to_owned())
-            .spawn(move || {
-                ask_for_real_time(priority, &wire.name());
-                run(wire, line);
-            })?;
-        Ok(Self {
+        let port = Self {
             newest,
             wanted,
             next: Written::default(),
             let_go,
             name,
             end,
-            thread: Some(thread),
-        })
+            thread: None,
+        };
+        (port, line)
+    }
+
+    /// Runs `wire` in a thread called `thread`. `priority` asks for real time, 0 does not.
+    ///
+    /// # Errors
+    /// The system has no thread.
+    pub(crate) fn start<W>(thread: &str, priority: u8, wire: W) -> std::io::Result<Self>
+    where
+        W: Wire<State = S, Command = C>,
+    {
+        let (mut port, line) = Self::ends(wire.name());
+        let thread = thread::Builder::new()
+            .name(thread.to_owned())
+            .spawn(move || {
+                ask_for_real_time(priority, &wire.name());
+                run(wire, line);
+            })?;
+        port.thread = Some(thread);
+        Ok(port)
     }
 
     /// What the device said last.
@@ -283,7 +296,7 @@ fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
     while !line.is_over() {
         let begun = monotonic_now();
         line.pace = wire.answers().then(|| Pace::new(&wire.name()));
-        line.asked = None;
+        (line.asked, line.turned) = (None, None);
         let ended = wire.session(&mut line);
         line.pace = None; // it reports
         let Err(lost) = ended else {
@@ -359,24 +372,43 @@ mod tests {
         (thread, said)
     }
 
-    fn wait_for(said: &Receiver<Option<f64>>, wanted: Option<f64>) {
-        while said.recv_timeout(Duration::from_secs(60)).expect("said") != wanted {}
+    /// Commands `wanted` until it is said: a thread of a busy machine that stands for long lets go.
+    fn say(thread: &mut WireThread<u32, f64>, said: &Receiver<Option<f64>>, wanted: f64) {
+        loop {
+            thread.let_go();
+            thread.command(wanted);
+            if said.recv_timeout(Duration::from_secs(60)).expect("said") == Some(wanted) {
+                return;
+            }
+        }
+    }
+
+    fn ms(time: u64) -> Duration {
+        Duration::from_millis(time)
+    }
+
+    /// What is said at the millisecond that each is given with.
+    fn says(line: &mut Line<u32, f64>, said: &[(u64, Option<f64>)]) {
+        for (time, wanted) in said {
+            assert_eq!(line.command(ms(*time)), *wanted, "at {time} ms");
+        }
     }
 
     #[test]
     fn a_command_is_not_held_when_nobody_writes_any_more() {
-        let (mut thread, said) = started();
-        wait_for(&said, None);
-        thread.command(2.0);
-        wait_for(&said, Some(2.0));
-        wait_for(&said, None);
+        let (mut port, mut line) = WireThread::<u32, f64>::ends("a wire".to_owned());
+        says(&mut line, &[(0, None)]);
+        port.command(2.0);
+        says(
+            &mut line,
+            &[(1, Some(2.0)), (11, Some(2.0)), (20, Some(2.0)), (21, None)],
+        );
     }
 
     #[test]
     fn a_lost_device_is_not_there_until_it_is_opened_again() {
         let (mut thread, said) = started();
-        thread.command(-1.0);
-        wait_for(&said, Some(-1.0));
+        say(&mut thread, &said, -1.0);
         while *thread.newest() != u32::MAX {
             thread::sleep(LOOK);
         }
@@ -387,30 +419,43 @@ mod tests {
 
     #[test]
     fn a_driver_that_has_let_go_renders_nothing_until_that_is_known() {
-        let (mut thread, said) = started();
-        assert!(!thread.let_go(), "nothing was rendered yet");
-        thread.command(2.0);
-        wait_for(&said, Some(2.0));
-        assert!(!thread.let_go());
-        wait_for(&said, None);
+        let (mut port, mut line) = WireThread::<u32, f64>::ends("a wire".to_owned());
+        says(&mut line, &[(0, None)]);
+        assert!(!port.let_go(), "nothing was rendered yet");
+        port.command(2.0);
+        says(&mut line, &[(1, Some(2.0)), (15, Some(2.0)), (30, None)]);
         // Made for a hand that feels the 2.
-        thread.command(1.9);
-        while said.try_recv().is_ok() {}
-        for _ in 0..5 {
-            thread.command(1.9);
-            assert_eq!(said.recv_timeout(CLOSE_WITHIN), Ok(None));
+        for time in 31..36 {
+            port.command(1.9);
+            says(&mut line, &[(time, None)]);
         }
-        assert!(thread.let_go());
-        thread.command(0.5);
-        wait_for(&said, Some(0.5));
-        assert!(!thread.let_go());
+        assert!(port.let_go());
+        port.command(0.5);
+        says(&mut line, &[(36, Some(0.5))]);
+        assert!(!port.let_go());
+    }
+
+    #[test]
+    fn a_driver_that_stood_for_longer_than_a_watchdog_waits_has_let_go() {
+        let (mut port, mut line) = WireThread::<u32, f64>::ends("a wire".to_owned());
+        port.command(2.0);
+        says(&mut line, &[(100, Some(2.0))]);
+        // The device's loop goes on meanwhile.
+        for time in [120, 141] {
+            port.command(2.0);
+            says(&mut line, &[(time, (time == 120).then_some(2.0))]);
+        }
+        port.command(2.0);
+        says(&mut line, &[(142, None)]);
+        assert!(port.let_go());
+        port.command(0.5);
+        says(&mut line, &[(143, Some(0.5))]);
     }
 
     #[test]
     fn zero_is_the_last_word() {
         let (mut thread, said) = started();
-        thread.command(3.0);
-        wait_for(&said, Some(3.0));
+        say(&mut thread, &said, 3.0);
         drop(thread);
         assert_eq!(said.iter().last(), Some(Some(0.0)));
     }

@@ -1,6 +1,7 @@
 //! The boards' side of the line, byte by byte, with strings and a hand behind it.
 //!
 //! Each byte that comes in clocks one byte of an answer out. A board that hears nothing keeps its last currents: nothing else is known of one.
+//! The hand holds the grip at the centre until the motors pull for the first time: who takes it to be there may take his time.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -22,6 +23,8 @@ pub struct SimulatedBoards {
     boards: Vec<(u8, BoardInfo)>,
     digits_per_newton: [f64; STRINGS],
     held: HeldStrings,
+    /// When the motors pulled first.
+    begun: Option<Duration>,
     digits: [i16; STRINGS],
     /// Where counting began.
     offsets: [i32; STRINGS],
@@ -60,6 +63,7 @@ impl SimulatedBoards {
             boards: boards.into_iter().flatten().collect(),
             digits_per_newton: digits_per_newton(geometry)?,
             held,
+            begun: None,
             digits: [0; STRINGS],
             offsets,
             packet: Vec::with_capacity(64),
@@ -121,6 +125,10 @@ impl SimulatedBoards {
         for (motor, bytes) in motors.clone().zip(self.packet[1..].chunks_exact(2)) {
             self.digits[motor] = i16::from_le_bytes([bytes[0], bytes[1]]);
         }
+        if self.digits != [0; STRINGS] {
+            self.begun.get_or_insert(now);
+        }
+        let now = self.begun.map_or(Duration::ZERO, |begun| now - begun);
         let reading = self.held.read_counts(now);
         let counts = reading.map_or([0; STRINGS], |reading| reading.counts);
         let tensions = std::array::from_fn(|i| {

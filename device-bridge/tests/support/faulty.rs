@@ -17,6 +17,8 @@ pub struct Faulty<T> {
     commanded: fn(&mut T) -> Vector3<f64>,
     mode: i64,
     served: i64,
+    /// How often it took what was on the way: a driver that gets no answers writes on, and what waits was written long ago.
+    takes: i64,
     seen: (u64, Vector3<f64>),
     jump: f64,
 }
@@ -33,6 +35,7 @@ impl<T> Faulty<T> {
             commanded,
             mode: GOOD,
             served: 0,
+            takes: 0,
             seen: (0, Vector3::zeros()),
             jump: 0.0,
         }))
@@ -59,6 +62,7 @@ impl<T: FarEnd> FarEnd for Faulty<T> {
             self.device.take(now, std::slice::from_ref(byte), out);
             self.see();
         }
+        self.takes += 1;
         self.served += i64::from(self.mode != GOOD);
         match self.mode {
             HANGS => out.truncate(begun),
@@ -78,7 +82,7 @@ impl<T> Inside for Arc<Mutex<Faulty<T>>> {
         match name {
             "force" => (line.seen.1.norm() * 1e6) as i64,
             "jump" => (line.jump * 1e6) as i64,
-            "writes" => line.seen.0 as i64,
+            "writes" => line.takes,
             "served" => line.served,
             other => panic!("{other}"),
         }

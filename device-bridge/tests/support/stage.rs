@@ -147,8 +147,12 @@ pub fn goes_wrong(choice: &str, inside: &dyn Inside, modes: &[(i64, &str)]) {
         inside.wait("it goes wrong", &|| {
             inside.get("served") > 0 || inside.get("closes") > closes
         });
-        let fault = stage.is_without_force_in_time().expect(named);
-        assert!(fault.to_string().contains(named), "{named}: {fault}");
+        stage.is_without_force_in_time().expect(named);
+        // A sample that a busy machine brings late is a fault of its own.
+        stage.until(named, |_, fault, force| {
+            assert!(force == 0.0 && fault.is_some(), "{force} N, {fault:?}");
+            fault.is_some_and(|fault| fault.to_string().contains(named))
+        });
         if mode != HANGS {
             stage.until("zero at the motors", |_, _, _| inside.get("force") == 0);
         }
