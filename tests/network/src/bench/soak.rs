@@ -18,7 +18,7 @@ use tokio::runtime::Runtime;
 
 use super::soak_log::SoakLog;
 use super::threads::runtime;
-use super::{BenchError, Ticker, serve_behind, server_options, state, wait_until};
+use super::{BenchError, Ticker, memory, serve_behind, server_options, state, wait_until};
 use crate::forge::{FORGERIES, Forger, MAX_FORGED_BYTES, Seen, payload_of_every_kind};
 use crate::random::Random;
 use crate::relay::{Burst, Direction, Impairment, Relay, RelayCounts, Treatment};
@@ -112,6 +112,7 @@ pub fn run(duration: Duration, seed: u64, log: &mut SoakLog) -> Result<Soak, Ben
         while log.elapsed_s() < duration.as_secs_f64() {
             crowd.come_and_go(Duration::from_secs_f64(quiet_s))?;
             crowd.rest()?;
+            memory::give_back();
             log.note(&this, std::process::id())?;
         }
         crowd.rest()
