@@ -94,8 +94,9 @@ fn compare(coupling: CouplingChoice, treatment: Treatment) -> Result<Finding, Be
         // On a machine that pauses the bridge again and again there is no force that could be attacked; what is promised holds all the same.
         let is_attack = attacked.max_force_n > FELT;
         if is_attack || !finding.kept || begun.elapsed() > PATIENCE {
+            let told = is_attack && attacked.safety_events > 0;
             return Ok(Finding {
-                kept: finding.kept && is_attack,
+                kept: finding.kept && told,
                 ..finding
             });
         }
@@ -117,9 +118,7 @@ fn judged(usual: &BridgeReport, attacked: &BridgeReport) -> Finding {
             late as f64 * 1e-3,
             attacked.safety_events,
         ),
-        kept: given[1] <= given[0] + MORE_ENERGY
-            && oldest <= allowed.as_secs_f64() * 1e3
-            && attacked.safety_events > 0,
+        kept: given[1] <= given[0] + MORE_ENERGY && oldest <= allowed.as_secs_f64() * 1e3,
     }
 }
 
