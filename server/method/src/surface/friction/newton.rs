@@ -9,7 +9,7 @@
 //! | r           | `stiffness`  |            | in units of the contact's own                                        |
 //! | G(y)        |              | m kg^(1/2) | `y - sum j lambda(y)`: zero where forces balance                     |
 //!
-//! What gives by a share 1/r of `lambda - lambda_0` has one answer, however many contacts there are and in whatever order they come. Where it is found,
+//! What gives by a share 1/r of `lambda - lambda_0` leaves no contact's share open, however many there are and in whatever order they come. Where that is found,
 //! `lambda` becomes `lambda_0` and the contacts are solved again, stiffer: they give less each time, down to a millionth of the way. A stiffness that does it
 //! at once leaves the iteration going round where contacts hardly slip. The first step takes the contacts that lambda_0 loads for the loaded ones, whatever y says: y is of the
 //! sample before, where the hand pressed less or more. A contact whose slip turns back within a step is taken as stuck in the next.
