@@ -32,8 +32,8 @@ impl Resources {
     }
 }
 
-/// Gives memory of this process that is free back to the system: what stays resident then is in use. The allocator's own would show how many clients
-/// there once were at a time.
+/// Returns this process's free heap pages to the system, so that resident memory is memory in use; else it would show the most clients there ever
+/// were at a time. Does nothing without glibc.
 pub(super) fn give_back() {
     #[cfg(target_env = "gnu")]
     #[allow(unsafe_code, reason = "no safe library trims the allocator")]

@@ -9,7 +9,7 @@ use std::net::{TcpListener, TcpStream};
 use std::process::Stdio;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use rustix::io::ioctl_fionread;
 use rustix::pipe::fcntl_setpipe_size;
@@ -62,11 +62,9 @@ pub(super) const ATTACKS: &[Attack] = &[
 
 /// A force at the arm that is one, N.
 const FELT: f64 = 0.5;
-/// Without a force for so long a hand has none.
-const GONE: Duration = Duration::from_secs(1);
 /// How far down the hand goes, m.
 const DEEP: f64 = -0.06;
-/// Of what a bridge said before it failed.
+/// Lines of a bridge's log that are told where it fails.
 const LAST_LINES: usize = 12;
 /// Lines for the log: who waits for the terminal does so from the first on.
 const LINES: usize = 30;
@@ -213,14 +211,7 @@ fn full_terminal(extent: &Extent) -> Result<Finding, BenchError> {
     }
     let felt = pressing.force();
     operator.post_arm(false);
-    // A busy machine takes the force away for a moment before the word has come: gone is what does not come back.
-    let mut gone = Instant::now();
-    wait_until("the end of the force", || {
-        if pressing.force() > 0.0 {
-            gone = Instant::now();
-        }
-        gone.elapsed() > GONE
-    })?;
+    wait_until("the end of the force", || pressing.force() == 0.0)?;
     let mut after = 0.0_f64;
     for _ in 0..100 {
         std::thread::sleep(Duration::from_millis(10));
