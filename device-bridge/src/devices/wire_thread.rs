@@ -9,7 +9,7 @@
 //! No command outlives its reason: from [`HOLDS`] after the last write of the device's loop on [`Line::command`] has none, and a session's last
 //! word is zero. A driver that has let go, or begins a session anew, renders nothing until the device's loop knows of it
 //! once more ([`WireThread::let_go`]): the next command was made for a hand that feels the last one, and would be a blow. The same holds where the
-//! driver's own thread has stood for longer than [`HOLDS`]: the device's watchdog has let go in its place.
+//! driver's own thread has stalled for longer than [`HOLDS`]: the device's watchdog has let go in its place.
 
 use std::fmt::Display;
 use std::sync::Arc;
@@ -82,7 +82,7 @@ pub(crate) struct Line<S: Send, C: Send> {
     /// Writes of the device's loop, and when the last was seen.
     seen: (u64, Duration),
     /// When the driver asked for a command last in this session.
-    turned: Option<Duration>,
+    called: Option<Duration>,
     /// Of this session, where a state answers each command.
     pace: Option<Pace>,
     /// When the command was taken that the next state answers.
@@ -125,10 +125,10 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
     /// The same for a driver that can render only while `can_render`; it lets go where it cannot.
     pub(crate) fn command_if(&mut self, now: Duration, can_render: bool) -> Option<C> {
         self.asked = Some(now);
-        let turned = self.turned.replace(now).unwrap_or(now);
-        let stood = now.saturating_sub(turned) > HOLDS;
+        let called = self.called.replace(now).unwrap_or(now);
+        let stalled = now.saturating_sub(called) > HOLDS;
         // Nobody has rendered what was commanded until now, whatever the device's loop was told before: it is told once more.
-        let missed = std::mem::take(&mut self.missed) || stood || !can_render;
+        let missed = std::mem::take(&mut self.missed) || stalled || !can_render;
         self.renders |= missed;
         let wanted = *self.wanted.read();
         if wanted.writes != self.seen.0 {
@@ -185,7 +185,7 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             out,
             wanted: taken,
             seen: (0, Duration::ZERO),
-            turned: None,
+            called: None,
             pace: None,
             asked: None,
             let_go: Arc::clone(&let_go),
@@ -296,7 +296,7 @@ fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
     while !line.is_over() {
         let begun = monotonic_now();
         line.pace = wire.answers().then(|| Pace::new(&wire.name()));
-        (line.asked, line.turned) = (None, None);
+        (line.asked, line.called) = (None, None);
         let ended = wire.session(&mut line);
         line.pace = None; // it reports
         let Err(lost) = ended else {
@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn a_driver_that_stood_for_longer_than_a_watchdog_waits_has_let_go() {
+    fn a_driver_that_stalled_for_longer_than_a_watchdog_waits_has_let_go() {
         let (mut port, mut line) = WireThread::<u32, f64>::ends("a wire".to_owned());
         port.command(2.0);
         says(&mut line, &[(100, Some(2.0))]);
