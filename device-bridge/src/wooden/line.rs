@@ -78,6 +78,9 @@ impl ReportLine for HidLine {
     }
 }
 
+/// A board that takes no report for so long is gone. Before that a write waits, as one of hidraw does: the last word is not lost because a board is busy.
+const TAKEN_WITHIN: Duration = Duration::from_millis(200);
+
 /// A socket keeps the borders of reports as hidraw does.
 pub struct SocketLine {
     socket: UnixDatagram,
@@ -96,6 +99,9 @@ impl SocketLine {
         let socket = UnixDatagram::bind(&own).map_err(said)?;
         let line = Self { socket, own };
         line.socket.connect(path).map_err(said)?;
+        line.socket
+            .set_write_timeout(Some(TAKEN_WITHIN))
+            .map_err(said)?;
         Ok(line)
     }
 }
@@ -110,13 +116,16 @@ impl ReportLine for SocketLine {
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, String> {
         let said = |error: std::io::Error| error.to_string();
         // A time of zero would wait for ever, and a short one for a tick of the kernel.
-        self.socket
-            .set_nonblocking(timeout.is_zero())
-            .map_err(said)?;
-        if !timeout.is_zero() {
+        let received = if timeout.is_zero() {
+            self.socket.set_nonblocking(true).map_err(said)?;
+            let received = self.socket.recv(buffer);
+            self.socket.set_nonblocking(false).map_err(said)?;
+            received
+        } else {
             self.socket.set_read_timeout(Some(timeout)).map_err(said)?;
-        }
-        match self.socket.recv(buffer) {
+            self.socket.recv(buffer)
+        };
+        match received {
             Ok(bytes) => Ok(bytes),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
                 Ok(0)
@@ -130,5 +139,34 @@ impl ReportLine for SocketLine {
             .send(report)
             .map(drop)
             .map_err(|error| error.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+    use std::thread;
+
+    use super::*;
+
+    #[test]
+    fn a_report_waits_for_a_board_that_is_busy() {
+        let place = tempfile::tempdir().expect("a directory");
+        let path = place.path().join("board");
+        let board = UnixDatagram::bind(&path).expect("a board");
+        let mut line = SocketLine::connect(&path).expect("its line");
+        let other = UnixDatagram::unbound().expect("a socket");
+        other.set_nonblocking(true).expect("set");
+        while other.send_to(&[1], &path).is_ok() {} // until no more fits
+        assert_eq!(line.read(&mut [0; 64], Duration::ZERO), Ok(0));
+        let (waits, waited) = channel();
+        let writer = thread::spawn(move || {
+            waits.send(()).expect("heard");
+            line.write(&[2])
+        });
+        waited.recv().expect("about to write");
+        let mut report = [0; 64];
+        while board.recv(&mut report).expect("a report") > 0 && report[0] != 2 {}
+        assert_eq!(writer.join().expect("written"), Ok(()));
     }
 }

@@ -28,6 +28,8 @@ pub struct SimulatedWooden {
     /// What a host that set the counters added to them.
     offsets: [i16; 6],
     reports: u64,
+    /// The hand waits where its path begins.
+    waits: bool,
 }
 
 impl SimulatedWooden {
@@ -57,7 +59,22 @@ impl SimulatedWooden {
             arm: HeldArm::new(crate::devices::polhem_grip(), hand, path, tremor),
             offsets: [0; 6],
             reports: 0,
+            waits: false,
         }
+    }
+
+    /// The same whose hand waits where its path begins, until [`Self::go`].
+    #[must_use]
+    pub fn waiting(self) -> Self {
+        Self {
+            waits: true,
+            ..self
+        }
+    }
+
+    /// The hand sets off.
+    pub fn go(&mut self) {
+        self.waits = false;
     }
 
     /// What the motors render, N.
@@ -80,7 +97,11 @@ impl SimulatedWooden {
 
     /// Takes a report of the host at `now`; the board's.
     pub fn take(&mut self, now: Duration, report: &[u8]) -> [u8; 14] {
-        self.arm.advance(now, MOTORS_OFF);
+        if self.waits {
+            let _ = self.arm.due(now); // passes all the same
+        } else {
+            self.arm.advance(now, MOTORS_OFF);
+        }
         self.reports += 1;
         let encoders = self.encoders();
         match HostReport::parse(report) {
