@@ -256,6 +256,7 @@ impl BridgeLoop {
             let command = match edge {
                 Some(edge) => edge.step(now, &reading.sample).map(|felt| Command {
                     obstacle_work: felt.obstacle_work,
+                    paused: felt.paused,
                     ..Command::on_set(felt.origin, felt.wrench)
                 }),
                 None => newest.map(|newest| command(&newest)),

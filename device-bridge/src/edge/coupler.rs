@@ -40,6 +40,8 @@ pub struct EdgeWrench {
     pub obstacle_work: f64,
     /// The projection was solved; if not, the wrench is zero.
     pub solved: bool,
+    /// The server says that no force is to be given: the wrench is for a force that fades.
+    pub paused: bool,
 }
 
 /// The coupling of a bridge. [`EdgeCoupler::step`] allocates nothing and waits for nobody.
@@ -141,15 +143,12 @@ impl EdgeCoupler {
             .coupling
             .answer(now.as_secs_f64(), reading, &sample.pose, &self.set);
         Some(EdgeWrench {
-            wrench: if self.paused {
-                Vector6::zeros()
-            } else {
-                output.wrench
-            },
+            wrench: output.wrench,
             origin: origin.min(sample.time),
             sequence: self.set.sequence,
             obstacle_work: self.coupling.obstacle_work(),
             solved: output.status == ProjectionStatus::Solved,
+            paused: self.paused,
         })
     }
 }
@@ -289,7 +288,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_paused_server_and_a_broken_set_give_no_new_force() {
+    fn a_broken_set_changes_nothing_and_a_pause_is_told() {
         let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
         let pose = Pose::translation(0.0, 0.0, 0.015);
         coupler.take(&floor(1, 0), MS).expect("a set");
@@ -300,6 +299,6 @@ pub(crate) mod tests {
         assert_eq!(coupler.step(MS, &at(MS, pose)), before);
         coupler.take(&floor(3, SET_PAUSED), 3 * MS).expect("a set");
         let paused = coupler.step(3 * MS, &at(3 * MS, pose)).expect("a set");
-        assert_eq!(paused.wrench, Vector6::zeros());
+        assert!(paused.paused && !before.expect("a set").paused);
     }
 }

@@ -90,6 +90,8 @@ pub(super) struct Situation {
     pub(super) stale_since: Option<Duration>,
     /// Nothing is wrong yet, but the last input is late.
     pub(super) late: bool,
+    /// Whoever commands gives no force now.
+    pub(super) paused: bool,
     /// There was at least one command.
     pub(super) commanded: bool,
     /// The dead-man's button is held, or there is none.
@@ -158,6 +160,11 @@ impl Arming {
     /// Share of the wrench that is let through now.
     pub(super) fn gain(&self) -> f64 {
         self.gain
+    }
+
+    /// Whether there is force, or will be without being asked for as soon as all is in order again.
+    pub(super) fn gives(&self) -> bool {
+        !self.state.is_off() && !self.cause_lasts()
     }
 
     /// Whether the wrench from before the fault goes on being felt, and no new one.
@@ -243,7 +250,7 @@ impl Arming {
             self.state = ArmingState::Disarmed;
             return Some(EventKind::Disarmed);
         }
-        if !(situation.asked || self.automatic) {
+        if !(situation.asked || self.automatic && !situation.paused) {
             return None;
         }
         if in_order {
@@ -295,7 +302,7 @@ impl Arming {
                 self.cause = Cause::Request;
                 self.begin_fading(now);
             }
-        } else if let Some(since) = situation.stale_since {
+        } else if let Some(since) = situation.stale_since.or(situation.paused.then_some(now)) {
             if self.state != ArmingState::Fading
                 && known.is_none_or(|cause| cause == Cause::Silence)
             {

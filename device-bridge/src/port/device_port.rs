@@ -40,6 +40,8 @@ pub struct TickReport {
     pub felt: Vector6<f64>,
     /// Where the port stands.
     pub state: ArmingState,
+    /// Whether there is force, or will be without being asked for as soon as all is in order again.
+    pub gives: bool,
     /// What happened.
     pub events: Events,
 }
@@ -235,6 +237,7 @@ impl DevicePort {
             wrench,
             felt,
             state: self.arming.state(),
+            gives: self.arming.gives(),
             events: *self.tick_events.events(),
         }
     }
@@ -469,6 +472,7 @@ impl DevicePort {
             fault_since,
             stale_since,
             late: late_sample || late_command,
+            paused: command.is_some_and(|command| command.paused),
             commanded: command.is_some() && self.last_good.is_some(),
             held,
             asked: std::mem::take(&mut self.arm_asked) || pressed,

@@ -333,6 +333,32 @@ fn who_disarms_is_asked_before_there_is_force_again() {
 }
 
 #[test]
+fn a_pause_of_whoever_commands_fades_and_what_comes_after_it_ramps_in() {
+    let automatic = Stage::armed(SafetySettings::default(), force(10.0));
+    for mut stage in [automatic, Stage::armed_by_a_person()] {
+        let mut paused_for = |time: u64| {
+            for _ in 0..time {
+                let now = stage.now + stage.period;
+                let command = Command {
+                    paused: true,
+                    ..Command::fresh(now, force(10.0))
+                };
+                let _ = stage.tick(Ok(sample(now)), Some(command));
+            }
+            stage.port.rendered().x
+        };
+        assert!((paused_for(48) - 5.0).abs() < 0.2);
+        assert_eq!(paused_for(52), 0.0);
+        assert_eq!(paused_for(1500), 0.0);
+        stage.good_for(ms(250), force(10.0));
+        assert!((stage.port.rendered().x - 5.0).abs() < 0.2);
+        stage.good_for(ms(300), force(10.0));
+        assert_eq!(stage.port.rendered(), &force(10.0));
+        assert_eq!(stage.kinds(), [EventKind::Arming, EventKind::Armed]);
+    }
+}
+
+#[test]
 fn nan_holds_the_last_force_and_lets_it_fade() {
     let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
     for age in 1..=300 {

@@ -19,6 +19,8 @@ pub struct Command {
     pub full_until: Duration,
     /// Net work that moving obstacles have done on the hand since the source of commands began, J.
     pub obstacle_work: f64,
+    /// Whoever commands gives no force now: what is felt fades, and ramps in when force is given again.
+    pub paused: bool,
     /// A wrench from outside beside it, as it is felt now: it has an age of its own and fades by itself ([`crate::ExternalWrench`]).
     pub external: nalgebra::Vector6<f64>,
 }
@@ -38,6 +40,7 @@ impl Command {
             constraint_age: Duration::ZERO,
             full_until: Duration::ZERO,
             obstacle_work: 0.0,
+            paused: false,
             external: nalgebra::Vector6::zeros(),
         }
     }

@@ -160,9 +160,9 @@ impl StateWriter {
         }
     }
 
-    /// Whether the haptics loop's port gives force, as of the last state.
+    /// Whether the haptics loop's port gives force, as of the last state: from the moment on at which somebody wants none, a bridge gives none.
     pub fn is_armed(&self) -> bool {
-        !self.shared.device.held().safety.arming.is_off()
+        self.shared.device.held().safety.gives
     }
 
     /// The newest of the god-object loop.

@@ -54,7 +54,7 @@ impl EdgeSets {
 
     /// Gives `send` what is due at `now`, if the bridge that `command` answers couples by itself and is heard; whether it does.
     ///
-    /// `armed`: the haptics loop's port lets force through; if not, the bridge's may not either.
+    /// `armed`: the haptics loop's port gives force; if not, the bridge's fades.
     pub fn tick(
         &mut self,
         now: Duration,

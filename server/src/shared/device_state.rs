@@ -43,8 +43,10 @@ pub const RECENT_EVENTS: usize = 8;
 /// Where the device port stands and what it told last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SafetyState {
-    /// Whether there is force.
+    /// Where the port stands.
     pub arming: ArmingState,
+    /// Whether there is force, or will be without being asked for as soon as all is in order again.
+    pub gives: bool,
     /// The newest events, at their number modulo the length.
     pub events: [Option<SafetyEvent>; RECENT_EVENTS],
 }
@@ -53,6 +55,7 @@ impl SafetyState {
     /// Takes over what a tick did.
     pub fn follow(&mut self, report: &TickReport) {
         self.arming = report.state;
+        self.gives = report.gives;
         for event in report.events.iter() {
             self.events[event.number as usize % RECENT_EVENTS] = Some(*event);
         }

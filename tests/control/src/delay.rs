@@ -13,9 +13,9 @@ use taut::loops::wiring::WiredLoops;
 use taut::session::edge_sets::EdgeSets;
 use taut_bridge::edge::{EdgeCoupler, offer_of};
 use taut_bridge::{
-    BridgeLoop, CommandSource, DEFAULT_MAX_AGE, DeviceLimits, DevicePort, EventKind, Grip, Hand,
-    MAX_EDGE_DELAY, MinJerkPath, Passivity, PassivitySettings, Pose, RemoteDevice, SafetySettings,
-    SimulatedDevice, ValidationSettings, ViaPoint,
+    ArmWish, BridgeLoop, CommandSource, DEFAULT_MAX_AGE, DeviceLimits, DevicePort, EventKind, Grip,
+    Hand, MAX_EDGE_DELAY, MinJerkPath, Passivity, PassivitySettings, Pose, RemoteDevice,
+    SafetySettings, SimulatedDevice, ValidationSettings, ViaPoint,
 };
 use taut_link::DeviceInput;
 use taut_method_tests::hand::Random;
@@ -170,6 +170,22 @@ impl Rubbing {
         }
     }
 
+    /// Goes down on a wall in half a second and stays there, 5 mm deep.
+    #[must_use]
+    pub fn pressing_on_wall() -> Self {
+        let via = |time_s, z| ViaPoint {
+            time_s,
+            pose: Pose::translation(0.0, 0.0, z),
+        };
+        match MinJerkPath::new(vec![via(0.0, 0.04), via(0.5, 0.005)], false) {
+            Ok(path) => Self {
+                task: Task::wall(),
+                path,
+            },
+            Err(error) => panic!("{error}"),
+        }
+    }
+
     /// Does once what the hand does in the study of coupling at the edge.
     #[must_use]
     pub fn once(task: Task) -> Self {
@@ -249,6 +265,32 @@ pub fn run_with(
     outcome
 }
 
+/// What is felt in each of `ticks` milliseconds, N, where an operator of the server wishes this; without delay.
+///
+/// # Panics
+/// When the scene of the task is none.
+#[must_use]
+pub fn felt_under(
+    wishes: &[(u32, ArmWish)],
+    rubbing: &Rubbing,
+    mode: Mode,
+    ticks: u32,
+) -> (Vec<f64>, Vec<EventKind>) {
+    let near = Impairment::new(0.3, 0.0);
+    let (mut up, mut down) = (Way::new(near, 11), Way::new(near, 12));
+    let mut server = Server::new(&rubbing.task);
+    let mut bridge = Bridge::new(rubbing, mode, Passivity::Control);
+    let (mut felt, mut events) = (Vec::new(), Vec::new());
+    for tick in 1..=ticks {
+        let wished = wishes.iter().filter(|(at, _)| *at == tick);
+        wished.for_each(|(_, wish)| server.loops.arm_switch.wish(*wish));
+        let now = TICK * tick;
+        felt.push(bridge.tick(tick, now, &mut down, &mut up, &mut events));
+        server.tick(now, &mut up, &mut down);
+    }
+    (felt, events)
+}
+
 /// The three loops, and what stands between them and the network.
 struct Server {
     loops: WiredLoops,
@@ -320,7 +362,7 @@ impl Server {
         loops.god_object.tick(|| now);
         loops.coupling.tick(now);
         let view = &mut loops.readers.broadcast;
-        let armed = !view.device.newest().safety.arming.is_off();
+        let armed = view.device.newest().safety.gives;
         let fresh = self.wrenches.update();
         let command = self.wrenches.output_buffer();
         let contacts = view.contacts.newest();

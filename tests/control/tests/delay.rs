@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use taut_bridge::{EventKind, Passivity};
-use taut_control_tests::delay::{Course, Growth, Rubbing, ZERO_AFTER, run, run_with};
+use taut_bridge::{ArmWish, EventKind, Passivity};
+use taut_control_tests::delay::{Course, Growth, Rubbing, ZERO_AFTER, felt_under, run, run_with};
 use taut_control_tests::edge::Mode;
 use taut_control_tests::edge_scenes::Task;
 
@@ -111,6 +111,34 @@ fn keeps_its_promise_at_any_slope(name: &str, rubbing: &Rubbing, begins_ms: &[u6
         usual.given * 1e3
     );
     assert!(more <= MORE, "{more} J: {case}");
+}
+
+#[test]
+fn who_disarms_and_arms_at_the_server_leads_the_force_down_and_up_wherever_it_is_computed() {
+    const OFF: u32 = 1500;
+    const ON: u32 = 3000;
+    let wishes = [(OFF, ArmWish::Disarm), (ON, ArmWish::Arm)];
+    for mode in [Mode::Edge, Mode::Shipped] {
+        let (felt, events) = felt_under(&wishes, &Rubbing::pressing_on_wall(), mode, 5000);
+        let at = |tick: u32| felt[tick as usize];
+        let full = at(OFF);
+        assert!(full > 2.0, "{full} N");
+        // Down in 95 ms and up in half a second, a few milliseconds after the wish; a light hand goes deeper as the force goes.
+        let shares = [at(OFF + 20), at(OFF + 85), at(ON + 10), at(4999)].map(|n| n / full);
+        let [soon, late, again, end] = shares;
+        assert!(soon > 0.6 && late < 0.7, "{}: {shares:?}", mode.name());
+        assert!(again < 0.3, "{}: {shares:?}", mode.name());
+        assert!((end - 1.0).abs() < 0.05, "{}: {shares:?}", mode.name());
+        let gone = &felt[(OFF + 105) as usize..ON as usize];
+        assert!(gone.iter().all(|force| *force == 0.0), "{}", mode.name());
+        let led = felt[OFF as usize..].windows(2);
+        let step = led
+            .map(|pair| (pair[1] - pair[0]).abs())
+            .fold(0.0, f64::max);
+        assert!(step < 0.2, "{}: {step} N at once", mode.name());
+        let fault = events.iter().find(|event| event.is_warning());
+        assert_eq!(fault, None, "{}: nothing is wrong", mode.name());
+    }
 }
 
 #[test]

@@ -17,6 +17,7 @@ enum Fault {
     CommandsStop,
     ConstraintsStop,
     CommandsAhead,
+    Paused,
     Disarm,
     None,
 }
@@ -33,6 +34,7 @@ fn faults() -> impl Strategy<Value = Vec<(Fault, u64, f64)>> {
         Just(Fault::CommandsStop),
         Just(Fault::ConstraintsStop),
         Just(Fault::CommandsAhead),
+        Just(Fault::Paused),
         Just(Fault::Disarm),
         Just(Fault::None),
     ];
@@ -90,13 +92,14 @@ proptest! {
                     Fault::CommandsStop => command.origin = good_command,
                     Fault::ConstraintsStop => command.constraint_age = now - begun,
                     Fault::CommandsAhead => command.origin = now + ms(50),
+                    Fault::Paused => command.paused = true,
                     Fault::Disarm => stage.port.ask_to_disarm(),
                     Fault::None => {}
                 }
                 if matches!(fault, Fault::Origin | Fault::Frozen | Fault::Nan | Fault::Jump | Fault::TimeBack | Fault::Unplugged) {
                     sample_is_good = false;
                 }
-                if matches!(fault, Fault::WrenchNan | Fault::CommandsStop | Fault::CommandsAhead | Fault::Disarm) {
+                if matches!(fault, Fault::WrenchNan | Fault::CommandsStop | Fault::CommandsAhead | Fault::Paused | Fault::Disarm) {
                     command_is_good = false;
                 }
                 let pose = answer.map(|sample| sample.pose).ok();
