@@ -226,16 +226,13 @@ fn the_edge_keeps_the_force_right_over_20_ms_and_5_percent_loss_where_shipping_d
     let whole = is_whole(&edge);
     let share = if whole { 0.5 } else { 0.25 };
     assert!(edge.lost_down > 0, "{}", edge.report);
-    let age = edge.report.set_age_us.expect("the clocks are locked");
-    assert!(age.p50 >= 18_000, "{age:?}");
     assert!(edge.errors.len() > 100, "{} states", edge.errors.len());
     assert!(edge.errors.iter().any(|(_, right)| *right > 2.0));
     println!(
-        "edge: {} % below {:.4} N, 99 % below {:.4} N of up to 5 N; set age {} us; {} safety events",
+        "edge: {} % below {:.4} N, 99 % below {:.4} N of up to 5 N; {} safety events",
         share * 100.0,
         quantile(&edge, share),
         quantile(&edge, 0.99),
-        age.p50,
         edge.report.safety_events
     );
     assert!(quantile(&edge, share) < 1e-3, "{}", edge.report);
@@ -248,6 +245,9 @@ fn the_edge_keeps_the_force_right_over_20_ms_and_5_percent_loss_where_shipping_d
     let shipped = run("server");
     assert_eq!(shipped.report.coupling, "server");
     assert!(shipped.report.wrenches > 0, "{}", shipped.report);
+    // By the bridge's clock alone: how old a set is said to be is off by what the way there was slower than the way back while the clocks were compared.
+    let round_trip = shipped.report.round_trip_us.expect("forces came");
+    assert!(round_trip.p50 >= 40_000, "{round_trip:?}");
     println!(
         "server: {:.2} N at most, {} safety events",
         shipped.report.max_force_n, shipped.report.safety_events
