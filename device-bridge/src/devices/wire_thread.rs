@@ -81,7 +81,7 @@ pub(crate) struct Line<S: Send, C: Send> {
     wanted: triple_buffer::Output<Written<C>>,
     /// Writes of the device's loop, and when the last was seen.
     seen: (u64, Duration),
-    /// When the driver asked for a command last in this session.
+    /// When the driver asked for a command last; long ago where nobody rendered what it was given.
     called: Option<Duration>,
     /// Of this session, where a state answers each command.
     pace: Option<Pace>,
@@ -90,8 +90,6 @@ pub(crate) struct Line<S: Send, C: Send> {
     /// How often the driver has let go, and whether it has rendered a command since.
     let_go: Arc<AtomicU64>,
     renders: bool,
-    /// Commands were made that nobody rendered.
-    missed: bool,
     end: Arc<AtomicBool>,
 }
 
@@ -126,9 +124,8 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
     pub(crate) fn command_if(&mut self, now: Duration, can_render: bool) -> Option<C> {
         self.asked = Some(now);
         let called = self.called.replace(now).unwrap_or(now);
-        let stalled = now.saturating_sub(called) > HOLDS;
         // Nobody has rendered what was commanded until now, whatever the device's loop was told before: it is told once more.
-        let missed = std::mem::take(&mut self.missed) || stalled || !can_render;
+        let missed = now.saturating_sub(called) > HOLDS || !can_render;
         self.renders |= missed;
         let wanted = *self.wanted.read();
         if wanted.writes != self.seen.0 {
@@ -146,7 +143,7 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
 
     /// The device has had zero for a while, whatever was commanded: the next command is none, and the port begins at zero.
     pub(crate) fn missed(&mut self) {
-        self.missed = true;
+        self.called = Some(Duration::ZERO);
     }
 
     /// There is no force on the hand, though one was commanded.
@@ -190,7 +187,6 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             asked: None,
             let_go: Arc::clone(&let_go),
             renders: false,
-            missed: false,
             end: Arc::clone(&end),
         };
         let port = Self {
@@ -296,7 +292,7 @@ fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
     while !line.is_over() {
         let begun = monotonic_now();
         line.pace = wire.answers().then(|| Pace::new(&wire.name()));
-        (line.asked, line.called) = (None, None);
+        line.asked = None;
         let ended = wire.session(&mut line);
         line.pace = None; // it reports
         let Err(lost) = ended else {
@@ -313,8 +309,7 @@ fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
             last_lost = lost;
         }
         if !line.is_over() {
-            thread::sleep(RETRY);
-            line.missed();
+            thread::sleep(RETRY); // longer than HOLDS: what was commanded meanwhile nobody rendered
         }
     }
 }
