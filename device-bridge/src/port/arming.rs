@@ -289,10 +289,13 @@ impl Arming {
         if let Some(since) = situation.fault_since {
             if known != Some(Cause::Fault) {
                 self.cause = Cause::Fault;
-                if self.state != ArmingState::Fading {
+                let since = since.saturating_add(settings.hold);
+                if self.state == ArmingState::Fading {
+                    self.begin_fading(since);
+                } else {
                     self.state = ArmingState::Holding;
                     self.fade = Fade {
-                        since: since.saturating_add(settings.hold),
+                        since,
                         gain: self.gain,
                     };
                 }
@@ -303,10 +306,10 @@ impl Arming {
                 self.begin_fading(now);
             }
         } else if let Some(since) = situation.stale_since.or(situation.paused.then_some(now)) {
-            if self.state != ArmingState::Fading
-                && known.is_none_or(|cause| cause == Cause::Silence)
-            {
+            if known.is_none_or(|cause| cause == Cause::Silence) {
                 self.cause = Cause::Silence;
+                self.begin_fading(since);
+            } else if self.state == ArmingState::Fading {
                 self.begin_fading(since);
             }
         } else if situation.late {
@@ -330,8 +333,11 @@ impl Arming {
         false
     }
 
+    /// Begins the way down, or has it begun earlier: what falls for a wish is gone no later than what falls for its age.
     fn begin_fading(&mut self, since: Duration) {
-        if self.state != ArmingState::Fading {
+        if self.state == ArmingState::Fading {
+            self.fade.since = self.fade.since.min(since);
+        } else {
             self.state = ArmingState::Fading;
             self.fade = Fade {
                 since,

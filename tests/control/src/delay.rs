@@ -265,7 +265,8 @@ pub fn run_with(
     outcome
 }
 
-/// What is felt in each of `ticks` milliseconds, N, where an operator of the server wishes this; without delay.
+/// What is felt in each of `ticks` milliseconds, N, where an operator of the server wishes this; without delay, and without
+/// control of energy, whose reserve is less than what a light hand is pushed back by.
 ///
 /// # Panics
 /// When the scene of the task is none.
@@ -279,7 +280,7 @@ pub fn felt_under(
     let near = Impairment::new(0.3, 0.0);
     let (mut up, mut down) = (Way::new(near, 11), Way::new(near, 12));
     let mut server = Server::new(&rubbing.task);
-    let mut bridge = Bridge::new(rubbing, mode, Passivity::Control);
+    let mut bridge = Bridge::new(rubbing, mode, Passivity::Observe);
     let (mut felt, mut events) = (Vec::new(), Vec::new());
     for tick in 1..=ticks {
         let wished = wishes.iter().filter(|(at, _)| *at == tick);

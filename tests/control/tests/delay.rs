@@ -115,16 +115,16 @@ fn keeps_its_promise_at_any_slope(name: &str, rubbing: &Rubbing, begins_ms: &[u6
 
 #[test]
 fn who_disarms_and_arms_at_the_server_leads_the_force_down_and_up_wherever_it_is_computed() {
-    const OFF: u32 = 1500;
-    const ON: u32 = 3000;
+    const OFF: u32 = 3000;
+    const ON: u32 = 5000;
     let wishes = [(OFF, ArmWish::Disarm), (ON, ArmWish::Arm)];
     for mode in [Mode::Edge, Mode::Shipped] {
-        let (felt, events) = felt_under(&wishes, &Rubbing::pressing_on_wall(), mode, 5000);
+        let (felt, events) = felt_under(&wishes, &Rubbing::pressing_on_wall(), mode, 9000);
         let at = |tick: u32| felt[tick as usize];
         let full = at(OFF);
-        assert!(full > 2.0, "{full} N");
+        assert!(full > 1.0, "{full} N");
         // Down in 95 ms and up in half a second, a few milliseconds after the wish; a light hand goes deeper as the force goes.
-        let shares = [at(OFF + 20), at(OFF + 85), at(ON + 10), at(4999)].map(|n| n / full);
+        let shares = [at(OFF + 20), at(OFF + 85), at(ON + 10), at(8999)].map(|n| n / full);
         let [soon, late, again, end] = shares;
         assert!(soon > 0.6 && late < 0.7, "{}: {shares:?}", mode.name());
         assert!(again < 0.3, "{}: {shares:?}", mode.name());

@@ -48,6 +48,8 @@ proptest! {
         automatic in any::<bool>(),
         rate_hz in prop::sample::select(vec![100_u32, 300, 1000, 4000]),
         speed in 0.2..1.0_f64,
+        // A set that waited for a network this long is rendered in full.
+        age_ms in 0_u64..75,
     ) {
         let settings = SafetySettings {
             period: Duration::from_secs(1) / rate_hz,
@@ -65,7 +67,8 @@ proptest! {
         let (own, own_torque) = (500.0 * period.min(0.002), 50.0 * period.min(0.002));
         let explained = (1.5 * 1000.0 * speed * period).min(4.0 * own);
         let explained_torque = (1.5 * 100.0 * speed * period).min(4.0 * own_torque);
-        // When the newest good sample and the newest good command came.
+        // When the newest good sample came, and what the newest good command comes from.
+        let age = ms(age_ms);
         let (mut good_sample, mut good_command) = (stage.now, stage.now);
         let mut before = *stage.port.rendered();
         let mut last_pose = Some(sample(stage.now).pose);
@@ -79,7 +82,7 @@ proptest! {
             while stage.now < begun + ms(duration_ms) {
                 let now = stage.now + settings.period;
                 let mut answer = Ok(sample(now));
-                let mut command = Command::fresh(now, Vector6::new(newtons, 3.0, 0.0, 0.0, 0.3, 0.0));
+                let mut command = Command::on_set(now - age, Vector6::new(newtons, 3.0, 0.0, 0.0, 0.3, 0.0));
                 let (mut sample_is_good, mut command_is_good) = (true, true);
                 match fault {
                     Fault::Origin => answer = Ok(DeviceSample { pose: Pose::identity(), ..sample(now) }),
@@ -99,7 +102,7 @@ proptest! {
                 if matches!(fault, Fault::Origin | Fault::Frozen | Fault::Nan | Fault::Jump | Fault::TimeBack | Fault::Unplugged) {
                     sample_is_good = false;
                 }
-                if matches!(fault, Fault::WrenchNan | Fault::CommandsStop | Fault::CommandsAhead | Fault::Paused | Fault::Disarm) {
+                if matches!(fault, Fault::WrenchNan | Fault::CommandsStop | Fault::CommandsAhead) {
                     command_is_good = false;
                 }
                 let pose = answer.map(|sample| sample.pose).ok();
@@ -126,7 +129,7 @@ proptest! {
                     good_sample = stage.now;
                 }
                 if command_is_good {
-                    good_command = stage.now;
+                    good_command = stage.now - age;
                 }
                 let felt = report.wrench;
                 prop_assert!(felt.iter().all(|x| x.is_finite()));
@@ -141,6 +144,10 @@ proptest! {
                 let silent = stage.now - good_sample.min(good_command);
                 if silent >= SafetySettings::ZERO_AFTER {
                     prop_assert_eq!(felt, Vector6::zeros(), "{:?} for {:?}", fault, silent);
+                }
+                let wished = matches!(fault, Fault::Paused | Fault::Disarm);
+                if wished && stage.now - begun >= SafetySettings::ZERO_AFTER {
+                    prop_assert_eq!(felt, Vector6::zeros(), "{:?}", fault);
                 }
                 before = felt;
             }
