@@ -132,37 +132,45 @@ impl Stage {
     }
 }
 
+/// Whether the port called it `named`; what it does is the same either way.
+fn went_wrong(stage: &mut Stage, inside: &dyn Inside, mode: i64, named: &str) -> bool {
+    stage.until_felt(inside);
+    if stage.port.info().actuated_degrees_of_freedom == 6 {
+        assert!(inside.get("torque") > 0, "no torque");
+    }
+    inside.set("served", 0);
+    inside.set("after", -1);
+    let closes = inside.get("closes");
+    inside.set("mode", mode);
+    inside.wait("it goes wrong", &|| {
+        inside.get("served") > 0 || inside.get("closes") > closes
+    });
+    let fault = stage.is_without_force_in_time().expect(named);
+    let is_late = matches!(fault, DeviceFault::Lost { .. });
+    let is_named = fault.to_string().contains(named);
+    assert!(is_named || is_late, "{named}: {fault}");
+    if mode != HANGS {
+        stage.until("zero at the motors", |_, _, _| inside.get("force") == 0);
+    }
+    if [TOO_HOT, UNPLUGGED].contains(&mode) {
+        inside.wait("it is closed", &|| inside.get("closes") > closes);
+    }
+    inside.set("mode", GOOD);
+    let back = stage.until_felt(inside);
+    println!("{fault}: felt again after {back} ms");
+    assert!(inside.get("after") <= 0, "a hang kept a force");
+    is_named
+}
+
 /// Everything that goes wrong with a device that has been felt, and what the port calls it.
 pub fn goes_wrong(choice: &str, inside: &dyn Inside, modes: &[(i64, &str)]) {
     let mut stage = Stage::new(choice, Rearm::Automatic);
     for &(mode, named) in modes {
-        stage.until_felt(inside);
-        if stage.port.info().actuated_degrees_of_freedom == 6 {
-            assert!(inside.get("torque") > 0, "no torque");
+        // Where a busy machine brought a sample late before it went wrong, that is what the port names: then it goes wrong once more.
+        let begun = Instant::now();
+        while !went_wrong(&mut stage, inside, mode, named) {
+            assert!(begun.elapsed() < PATIENCE, "never called {named}");
         }
-        inside.set("served", 0);
-        inside.set("after", -1);
-        let closes = inside.get("closes");
-        inside.set("mode", mode);
-        inside.wait("it goes wrong", &|| {
-            inside.get("served") > 0 || inside.get("closes") > closes
-        });
-        stage.is_without_force_in_time().expect(named);
-        // A sample that a busy machine brings late is a fault of its own.
-        stage.until(named, |_, fault, force| {
-            assert!(force == 0.0 && fault.is_some(), "{force} N, {fault:?}");
-            fault.is_some_and(|fault| fault.to_string().contains(named))
-        });
-        if mode != HANGS {
-            stage.until("zero at the motors", |_, _, _| inside.get("force") == 0);
-        }
-        if [TOO_HOT, UNPLUGGED].contains(&mode) {
-            inside.wait("it is closed", &|| inside.get("closes") > closes);
-        }
-        inside.set("mode", GOOD);
-        let back = stage.until_felt(inside);
-        println!("{named}: felt again after {back} ms");
-        assert!(inside.get("after") <= 0, "a hang kept a force");
     }
     drop(stage);
     assert_eq!(inside.get("force"), 0, "a force stayed");
