@@ -160,13 +160,15 @@ mod tests {
         while other.send_to(&[1], &path).is_ok() {} // until no more fits
         assert_eq!(line.read(&mut [0; 64], Duration::ZERO), Ok(0));
         let (waits, waited) = channel();
-        let writer = thread::spawn(move || {
-            waits.send(()).expect("heard");
-            line.write(&[2])
+        thread::scope(|scope| {
+            let writer = scope.spawn(|| {
+                waits.send(()).expect("heard");
+                line.write(&[2])
+            });
+            waited.recv().expect("about to write");
+            let mut report = [0; 64];
+            while board.recv(&mut report).expect("a report") > 0 && report[0] != 2 {}
+            assert_eq!(writer.join().expect("written"), Ok(()));
         });
-        waited.recv().expect("about to write");
-        let mut report = [0; 64];
-        while board.recv(&mut report).expect("a report") > 0 && report[0] != 2 {}
-        assert_eq!(writer.join().expect("written"), Ok(()));
     }
 }

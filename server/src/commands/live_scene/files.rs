@@ -63,8 +63,13 @@ impl SceneWatch {
             Ok(next)
         });
         match loaded {
-            // The workbench file may have changed in what is followed without a new session, or needs a restart.
-            Ok(next) if contents(&next.workbench.scene, &self.paths) == self.contents => None,
+            // The workbench file may have changed in what is followed without a new session, or needs a restart. What was read counts: what was written
+            // since then is due by itself.
+            Ok(next)
+                if next.files.as_ref().map(|files| &files.contents) == Some(&self.contents) =>
+            {
+                None
+            }
             Ok(next) => {
                 terminal.say(&format!(
                     "the scene {} is taken: the force fades, and another session begins",
