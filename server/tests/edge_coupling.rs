@@ -226,6 +226,9 @@ fn the_edge_keeps_the_force_right_over_20_ms_and_5_percent_loss_where_shipping_d
     let whole = is_whole(&edge);
     let share = if whole { 0.5 } else { 0.25 };
     assert!(edge.lost_down > 0, "{}", edge.report);
+    // By the bridge's clock alone: how old a set is said to be is off by what the way there was slower than the way back while the clocks were compared.
+    assert!(edge.report.set_age_us.is_some(), "{}", edge.report);
+    assert!(edge.report.max_force_age_ms >= 40.0, "{}", edge.report);
     assert!(edge.errors.len() > 100, "{} states", edge.errors.len());
     assert!(edge.errors.iter().any(|(_, right)| *right > 2.0));
     println!(
@@ -245,7 +248,6 @@ fn the_edge_keeps_the_force_right_over_20_ms_and_5_percent_loss_where_shipping_d
     let shipped = run("server");
     assert_eq!(shipped.report.coupling, "server");
     assert!(shipped.report.wrenches > 0, "{}", shipped.report);
-    // By the bridge's clock alone: how old a set is said to be is off by what the way there was slower than the way back while the clocks were compared.
     let round_trip = shipped.report.round_trip_us.expect("forces came");
     assert!(round_trip.p50 >= 40_000, "{round_trip:?}");
     println!(

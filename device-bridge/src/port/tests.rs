@@ -359,6 +359,36 @@ fn a_pause_of_whoever_commands_fades_and_what_comes_after_it_ramps_in() {
 }
 
 #[test]
+fn what_falls_for_a_wish_is_gone_as_early_as_what_falls_for_its_age() {
+    for (disarmed, lost) in [(true, false), (true, true), (false, false), (false, true)] {
+        let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
+        // In full until 75 ms, and nothing newer comes.
+        let origin = stage.now + stage.period - ms(74);
+        for tick in 0..200 {
+            if tick == 0 && disarmed {
+                stage.port.ask_to_disarm();
+            }
+            let now = stage.now + stage.period;
+            let answer = match tick {
+                1.. if lost => Err(DeviceFault::NotFinite),
+                _ => Ok(sample(now)),
+            };
+            let command = Command {
+                paused: !disarmed,
+                ..Command::on_set(origin, force(10.0))
+            };
+            let felt = stage.tick(answer, Some(command)).wrench.norm();
+            assert!(tick > 0 || felt > 9.0, "{felt} N at first");
+            let age = now - origin;
+            assert!(
+                felt == 0.0 || age < SafetySettings::ZERO_AFTER,
+                "{felt} N at {age:?}, disarmed: {disarmed}, lost: {lost}"
+            );
+        }
+    }
+}
+
+#[test]
 fn nan_holds_the_last_force_and_lets_it_fade() {
     let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
     for age in 1..=300 {

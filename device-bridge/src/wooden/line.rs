@@ -154,6 +154,8 @@ mod tests {
         let place = tempfile::tempdir().expect("a directory");
         let path = place.path().join("board");
         let board = UnixDatagram::bind(&path).expect("a board");
+        let long = Duration::from_secs(60);
+        board.set_read_timeout(Some(long)).expect("set");
         let mut line = SocketLine::connect(&path).expect("its line");
         let other = UnixDatagram::unbound().expect("a socket");
         other.set_nonblocking(true).expect("set");

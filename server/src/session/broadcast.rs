@@ -160,7 +160,7 @@ impl StateWriter {
         }
     }
 
-    /// Whether the haptics loop's port gives force, as of the last state: from the moment on at which somebody wants none, a bridge gives none.
+    /// Whether the haptics loop's port gives force, as of the last state; false as soon as somebody disarms, so that a bridge fades at once.
     pub fn is_armed(&self) -> bool {
         self.shared.device.held().safety.gives
     }

@@ -170,7 +170,7 @@ impl Rubbing {
         }
     }
 
-    /// Goes down on a wall in half a second and stays there, 5 mm deep.
+    /// Goes down on a wall in half a second and stays there, 15 mm deep if nothing held it.
     #[must_use]
     pub fn pressing_on_wall() -> Self {
         let via = |time_s, z| ViaPoint {

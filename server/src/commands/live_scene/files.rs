@@ -96,3 +96,74 @@ fn contents(scene: &str, paths: &[PathBuf]) -> Vec<Vec<u8>> {
         .chain(files)
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+    use std::time::Duration;
+
+    use clap::Parser;
+    use taut_scene::SHIPPED_WORKBENCH;
+    use taut_test_kit::BALL_ON_FLOOR;
+
+    use super::super::load::Loader;
+    use super::*;
+    use crate::cli::ServeArgs;
+    use crate::session::setup::workbench::Overrides;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        args: ServeArgs,
+    }
+
+    /// Asks until the files are read, `then` does what it does, and the answer is there.
+    fn followed(watch: &mut SceneWatch, loader: &Loader, then: impl Fn()) -> Option<Next> {
+        let mut was_read = false;
+        loop {
+            let next = watch.follow(&Terminal::standard_error(), || {
+                was_read = true;
+                let next = loader.load();
+                then();
+                next
+            });
+            if was_read {
+                return next;
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    #[test]
+    fn a_scene_that_is_written_while_it_is_read_makes_one_session_and_that_of_the_new_text() {
+        let place = tempfile::tempdir().expect("a directory");
+        let [config, key, scene] =
+            ["workbench.toml", "key", "scene.toml"].map(|name| place.path().join(name));
+        let scene_name = scene.to_str().expect("a plain path");
+        let workbench = SHIPPED_WORKBENCH.replace(
+            "scene = \"peg-in-a-hole\"",
+            &format!("scene = \"{scene_name}\""),
+        );
+        std::fs::write(&config, workbench).expect("written");
+        let write = |k_h: &str| {
+            let text = BALL_ON_FLOOR.replace("2000.0", k_h);
+            std::fs::write(&scene, text).expect("written");
+        };
+        write("2000.0");
+        taut_link::create_key_file(&key).expect("a key");
+        let words = ["serve".as_ref(), "--config".as_ref(), config.as_os_str()];
+        let more = ["--key".as_ref(), key.as_os_str(), "--follow-scene".as_ref()];
+        let args = Cli::try_parse_from([words, more].concat())
+            .expect("valid")
+            .args;
+        let loader = Loader::new(args, Overrides::default());
+        let mut first = loader.load().unwrap_or_else(|error| panic!("{error}"));
+        let mut watch = first.files.take().expect("it follows");
+
+        write("2000.0"); // the same text, at a later time
+        let none = followed(&mut watch, &loader, || write("1500.0"));
+        assert!(none.is_none(), "a session of the old text");
+        let next = followed(&mut watch, &loader, || ()).expect("the new one");
+        assert!(next.in_file.contains("1500.0"), "{}", next.in_file);
+    }
+}

@@ -15,9 +15,10 @@ use rustix::io::ioctl_fionread;
 use rustix::pipe::fcntl_setpipe_size;
 use rustix::process::Signal;
 use taut_bridge::wooden::{SimulatedWooden, WOODEN_MODELS, WoodenService};
-use taut_bridge::{Hand, MinJerkPath, Pose, ViaPoint};
+use taut_bridge::{EventKind, Hand, MinJerkPath, Pose, ViaPoint};
 use taut_link::proto::control::LogLevel;
 use taut_link::proto::state::RunState;
+use taut_link::proto::state::event_code::safety_of;
 use taut_link::{ClientLink, ClientOptions, ClusterKey, ReceivedState, Role, connect};
 use tokio::runtime::Runtime;
 
@@ -141,7 +142,7 @@ impl Pressing {
         // The body starts where the arm is read first: the hand sets off when readings come.
         let (runtime, key) = (Runtime::new()?, workbench.key()?);
         let watcher = runtime.block_on(connect(options(server, key, "watcher")))?;
-        says(&watcher, RunState::Running, || {})?;
+        says(&watcher, true)?;
         runtime.block_on(watcher.close());
         pressing.arm.arm().go();
         wait_until("a force at the arm", || pressing.force() > FELT)?;
@@ -167,16 +168,15 @@ impl Pressing {
     }
 }
 
-/// Waits until the server says to `client` that it does `run`; `ask`s for it again and again.
-fn says(client: &ClientLink, run: RunState, ask: impl Fn()) -> Result<(), BenchError> {
+/// Waits until the server says to `client` that forces are given, or that they are not.
+fn says(client: &ClientLink, given: bool) -> Result<(), BenchError> {
     let mut states = Vec::new();
-    wait_until(&format!("the server's word: {run:?}"), || {
-        ask();
-        std::thread::sleep(Duration::from_millis(20));
+    client.drain_states(&mut states); // of before
+    wait_until("the server's word of its force", || {
         states.clear();
         client.drain_states(&mut states);
         let mut own = states.iter().filter_map(ReceivedState::of_server);
-        own.any(|state| state.run() == run)
+        own.any(|state| (state.run() == RunState::Running) == given)
     })
 }
 
@@ -247,20 +247,23 @@ fn full_terminal(extent: &Extent) -> Result<Finding, BenchError> {
         felt = pressing.force();
         felt > FELT
     })?;
-    // A stall of the machine takes the force away, too, and a force that fades may be back for that moment: what stays away is asked of what
-    // follows the server's word. Who is not sure disarms again.
-    says(&operator, RunState::Paused, || {
-        operator.post_arm(false);
+    // Once. A stall of the machine takes the force away, too, and one that fades may be back for a moment: what stays away is asked of what follows
+    // the server's word.
+    operator.post_arm(false);
+    let mut events = Vec::new();
+    wait_until("the server's word that it was disarmed", || {
+        operator.drain_events(&mut events);
+        let mut kinds = events.drain(..).filter_map(|event| safety_of(event.code));
+        kinds.any(|(kind, _)| EventKind::from_number(kind) == Some(EventKind::Disarmed))
     })?;
+    says(&operator, false)?;
     wait_until("the end of the force", || pressing.force() == 0.0)?;
     let mut after = 0.0_f64;
     for _ in 0..100 {
         std::thread::sleep(Duration::from_millis(10));
         after = after.max(pressing.force());
     }
-    says(&operator, RunState::Running, || {
-        operator.post_arm(true);
-    })?;
+    operator.post_arm(true);
     wait_until("the force again", || pressing.force() > FELT)?;
     let left = pressing.end(Signal::TERM)?;
     server.process.signal(Signal::TERM)?;
