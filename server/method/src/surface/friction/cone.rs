@@ -28,21 +28,30 @@ pub(super) struct ConeProblem {
     pub(super) contacts: ArrayVec<ConeContact, MAX_CONE_CONTACTS>,
 }
 
+/// By what a cone problem is measured.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measure {
+    /// Length in whitened coordinates that residuals are relative to, > 0.
+    pub(super) scale: f64,
+    /// Slip and penetration that count as none, m.
+    pub(super) no_slip: f64,
+}
+
 /// How a cone problem ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ConeAnswer {
     /// `L^T (a - a_u)`.
     pub(super) correction: Vector6,
-    /// Slip and penetration that are left, or what the cones cut of full stick, relative to `scale`; 0 where full stick was the answer.
+    /// Slip and penetration that are left, or what the cones cut of full stick, relative to the scale; 0 where full stick was the answer.
     pub(super) residual: f64,
 }
 
 impl ConeProblem {
-    /// Solves the problem; the multipliers stay in the contacts. `scale` is a length in whitened coordinates, > 0; `likely` is a correction that
-    /// may be near the answer.
+    /// Solves the problem; the multipliers stay in the contacts. `likely` is a correction that may be near the answer.
     ///
     /// Where the Newton iteration comes to its limit, full stick cut to the cones stays, and a residual that says how much was cut.
-    pub(super) fn solve(&mut self, scale: f64, likely: &Vector6) -> ConeAnswer {
+    pub(super) fn solve(&mut self, measure: Measure, likely: &Vector6) -> ConeAnswer {
+        let scale = measure.scale;
         let held = Held::by(&self.contacts);
         let before = self.contacts.clone();
         let cut = self.start_from_stick(held.as_ref());
@@ -57,7 +66,7 @@ impl ConeProblem {
             let lacking = likely - self.wrench();
             self.share(&held.solve(&lacking));
         }
-        let residual = self.balance(scale, likely);
+        let residual = self.balance(measure, likely);
         if residual.is_none() {
             self.start_from_stick(held.as_ref());
         }
@@ -68,8 +77,8 @@ impl ConeProblem {
     }
 
     /// The same again after a contact has come to those of the last answer, `before`.
-    pub(super) fn solve_again(&mut self, scale: f64, before: &ConeAnswer) -> ConeAnswer {
-        let residual = self.balance(scale, &before.correction);
+    pub(super) fn solve_again(&mut self, measure: Measure, before: &ConeAnswer) -> ConeAnswer {
+        let residual = self.balance(measure, &before.correction);
         ConeAnswer {
             correction: self.wrench(),
             residual: residual.unwrap_or(before.residual),

@@ -4,14 +4,15 @@
 //! multipliers are then a known wrench, and Eq. (1) is projected once more with that wrench in a_u. So the answer keeps its certificate
 //! (the normal rows hold exactly, whatever the cone problem left), and the multipliers of both parts balance `M (a_c - a_u)`.
 //!
-//! No energy is made: the tangential multipliers oppose the slip since the contact stuck last, or friction is taken back.
+//! No energy is made: the tangential multipliers oppose the slip since the contact stuck last, or the cone problem is solved further, and friction
+//! dropped at last.
 //! Source: beyond the paper, which is frictionless. Coulomb's law in displacements, as the motion is quasi-static (Section 4.2).
 
 use arrayvec::ArrayVec;
 use nalgebra::{Point3, Vector3};
 
 use super::carried::Carried;
-use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
+use super::cone::{ConeProblem, MAX_CONE_CONTACTS, Measure};
 use super::selection::ContactRow;
 use crate::constraint::NonPenetrationConstraint;
 use crate::quasi_statics::{
@@ -23,10 +24,14 @@ use crate::world::World;
 
 /// A contact touches when its row is this near to equality, in motion tolerances: gaps at rest differ by as much.
 pub(crate) const TOUCHING_MOTION_TOLERANCES: f64 = 4.0;
+/// Slip and penetration that the cone problem may leave, as a share of that: neither motion nor energy to what follows. A body that is wedged moves by
+/// a multiple of it in the second projection;
+const NO_SLIP_SHARE: f64 = 0.5;
+/// where that would make energy, the cone problem is solved further: to this share of it, so many times. Then friction is dropped.
+const FINER: f64 = 0.1;
+const MAX_REFINEMENTS: usize = 3;
 /// Friction may press the body against other rows: so many times the one that the answer violates most becomes a contact.
 const MAX_ADDED: usize = 3;
-/// A friction that would make energy is halved so often, then dropped.
-const MAX_HALVINGS: usize = 3;
 
 /// Coulomb friction of one loop. No allocation after `new`.
 #[derive(Clone, Debug)]
@@ -87,7 +92,7 @@ impl FrictionProblem<'_> {
 
 impl Friction {
     /// Most projections of one [`Friction::hold`].
-    pub(crate) const MAX_PROJECTIONS: u32 = MAX_HALVINGS as u32 + 1;
+    pub(crate) const MAX_PROJECTIONS: u32 = MAX_REFINEMENTS as u32 + 1;
 
     /// The friction of a world; `None` where every obstacle is frictionless: then there is nothing to pay.
     pub fn of(world: &World, settings: &Settings) -> Option<Self> {
@@ -193,17 +198,30 @@ impl Friction {
         if self.last == Vector6::zeros() {
             self.last = metric.whiten(&(frictionless.acceleration - problem.unconstrained));
         }
-        let mut answer = self.cone.solve(scale, &self.last);
+        let mut measure = Measure {
+            scale,
+            no_slip: NO_SLIP_SHARE * self.touching,
+        };
+        let mut answer = self.cone.solve(measure, &self.last);
         for _ in 0..MAX_ADDED {
             if !self.add_violated(problem, &answer.correction) {
                 break;
             }
-            answer = self.cone.solve_again(scale, &answer);
+            answer = self.cone.solve_again(measure, &answer);
         }
-        self.last = answer.correction;
         let active: ArrayVec<u32, MAX_ACTIVE> =
             frictionless.active.iter().map(|row| row.row).collect();
-        let held = self.project_with_grip(problem, &active, projector);
+        let mut refinements = 0..MAX_REFINEMENTS;
+        let held = loop {
+            let held = self.project_with_grip(problem, &active, projector);
+            let makes_energy = held.as_ref().is_some_and(|(_, it)| !self.dissipates(it));
+            if !makes_energy || refinements.next().is_none() {
+                break held.filter(|_| !makes_energy);
+            }
+            measure.no_slip *= FINER;
+            answer = self.cone.solve_again(measure, &answer);
+        };
+        self.last = answer.correction;
         let Some((projection, correction)) = held else {
             self.residual = f64::INFINITY;
             return frictionless;
@@ -220,29 +238,18 @@ impl Friction {
         self.last = Vector6::zeros();
     }
 
-    /// Eq. (1) once more, with the cone problem's tangential wrench in a_u; with its `L^T (a_c - a_u)`.
+    /// Eq. (1) once more, with the cone problem's tangential wrench in a_u; with its `L^T (a_c - a_u)`. `None` where it has no certificate.
     fn project_with_grip(
-        &mut self,
+        &self,
         problem: &FrictionProblem<'_>,
         likely: &[u32],
         projector: &mut Projector,
     ) -> Option<(Projection, Vector6)> {
-        for _ in 0..=MAX_HALVINGS {
-            let pulled = problem.unconstrained + problem.metric.unwhiten(&self.cone.grip_wrench());
-            let projection = projector.project_prepared(&pulled, likely);
-            if projection.status != ProjectionStatus::Solved {
-                return None;
-            }
-            let change = projection.acceleration - problem.unconstrained;
-            let correction = problem.metric.whiten(&change);
-            if self.dissipates(&correction) {
-                return Some((projection, correction));
-            }
-            for contact in &mut self.cone.contacts {
-                contact.grip = contact.grip.map(|grip| 0.5 * grip);
-            }
-        }
-        None
+        let pulled = problem.unconstrained + problem.metric.unwhiten(&self.cone.grip_wrench());
+        let projection = projector.project_prepared(&pulled, likely);
+        let change = projection.acceleration - problem.unconstrained;
+        let solved = projection.status == ProjectionStatus::Solved;
+        solved.then(|| (projection, problem.metric.whiten(&change)))
     }
 
     /// Whether friction takes energy at this correction; notes whether a loaded contact slips.

@@ -10,14 +10,15 @@
 //! | G(y)        |              | m kg^(1/2) | `y - sum j lambda(y)`: zero where forces balance                     |
 //!
 //! What gives by a share 1/r of `lambda - lambda_0` leaves no contact's share open, however many there are and in whatever order they come. Where that is found,
-//! `lambda` becomes `lambda_0` and the contacts are solved again, stiffer: they give less each time, down to a millionth of the way. A stiffness that does it
-//! at once leaves the iteration going round where contacts hardly slip. The first step takes the contacts that lambda_0 loads for the loaded ones, whatever y says: y is of the
+//! `lambda` becomes `lambda_0` and the contacts are solved again, stiffer: they give less each time. A stiffness that does it
+//! at once leaves the iteration going round where contacts hardly slip. It is
+//! converged when the slip and penetration that the compliance allows count as none. The first step takes the contacts that lambda_0 loads for the loaded ones, whatever y says: y is of the
 //! sample before, where the hand pressed less or more. A contact whose slip turns back within a step is taken as stuck in the next.
 //! Source: Alart and Curnier 1991, in six unknowns; Simo and Laursen 1992 (augmented Lagrangian of friction); Bertsekas 1982, Section 2.2 (growing stiffness).
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
+use super::cone::{ConeProblem, MAX_CONE_CONTACTS, Measure};
 use super::contact::ConeContact;
 use crate::quasi_statics::lanes::{Lanes8, add_scaled, dot, widened};
 use crate::spatial::Vector6;
@@ -32,8 +33,6 @@ const MAX_AUGMENTATIONS: usize = 8;
 const STIFFER: f64 = 10.0;
 /// where forces do not balance, they are tried again with this share of the stiffness.
 const SOFTER: f64 = 0.2;
-/// It is converged when the slip and penetration that the compliance allows are at most this share of the scale.
-const NO_SLIP: f64 = 1e-6;
 /// Forces balance when this share of the scale is left.
 const BALANCE_TOLERANCE: f64 = 1e-6;
 
@@ -239,7 +238,7 @@ fn scaled(a: &Lanes8, by: f64) -> Lanes8 {
 struct Balance<'a> {
     problem: &'a mut ConeProblem,
     start: &'a Vector6,
-    scale: f64,
+    measure: Measure,
 }
 
 impl WithSimd for Balance<'_> {
@@ -252,7 +251,8 @@ impl WithSimd for Balance<'_> {
         for (rows, contact) in rows.iter_mut().zip(contacts.iter()) {
             *rows = Rows::of(contact);
         }
-        let tolerance = BALANCE_TOLERANCE * self.scale;
+        let Measure { scale, no_slip } = self.measure;
+        let tolerance = BALANCE_TOLERANCE * scale;
         let mut y = widened(self.start);
         let mut left: Option<f64> = None;
         let mut stiffness = STIFFNESS;
@@ -263,19 +263,21 @@ impl WithSimd for Balance<'_> {
                 continue;
             };
             y = next;
-            let mut given = 0.0_f64;
+            let (mut given, mut slip) = (0.0_f64, 0.0_f64);
             for ((rows, contact), reaction) in rows.iter().zip(&mut *contacts).zip(&reactions) {
                 let grip = reaction.grip();
                 let change = scaled(&rows.normal, reaction.load - contact.load);
                 let change = add_scaled(&change, &rows.tangents[0], grip[0] - contact.grip[0]);
                 let change = add_scaled(&change, &rows.tangents[1], grip[1] - contact.grip[1]);
-                given = given.max(dot(&change, &change));
+                let change = dot(&change, &change);
+                given = given.max(change);
+                // A unit of slip or penetration is a whitened length of the root of the step, or less.
+                slip = slip.max(change / contact.normal_step);
                 contact.load = reaction.load;
                 contact.grip = grip;
             }
-            let given = given.sqrt() / (stiffness * self.scale);
-            left = Some(given);
-            if given <= NO_SLIP {
+            left = Some(given.sqrt() / (stiffness * scale));
+            if slip.sqrt() <= no_slip * stiffness {
                 break;
             }
             stiffness *= STIFFER;
@@ -332,15 +334,15 @@ fn newton(
 }
 
 impl ConeProblem {
-    /// Finds the multipliers, from those in the contacts and a correction `start` that is likely; `scale` is a length in whitened coordinates, > 0.
+    /// Finds the multipliers, from those in the contacts and a correction `start` that is likely.
     ///
-    /// Returns the slip and penetration that are left, relative to `scale`; `None` where forces do not balance
+    /// Returns the slip and penetration that are left, relative to the scale; `None` where forces do not balance
     /// by then: the multipliers stay as they were.
-    pub(super) fn balance(&mut self, scale: f64, start: &Vector6) -> Option<f64> {
+    pub(super) fn balance(&mut self, measure: Measure, start: &Vector6) -> Option<f64> {
         Arch::new().dispatch(Balance {
             problem: self,
             start,
-            scale,
+            measure,
         })
     }
 }
