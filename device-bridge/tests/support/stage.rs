@@ -57,6 +57,8 @@ pub struct Stage {
     pub floor: (f64, f64),
     /// How many writes a line had made when it was lost.
     lost_at: Option<i64>,
+    /// Up to this difference, uN, a device has the force that it was told: what its digits may change, and no more than is allowed beside the slew.
+    rounded: i64,
     /// When the last tick was made.
     ticked: Instant,
     /// Longest time between two ticks.
@@ -77,6 +79,7 @@ impl Stage {
             time: 1000,
             floor: (-0.02, 200.0),
             lost_at: None,
+            rounded: 0,
             ticked: Instant::now(),
             longest_gap: Duration::ZERO,
         }
@@ -176,8 +179,8 @@ pub fn goes_wrong(choice: &str, inside: &dyn Inside, modes: &[(i64, &str)]) {
     assert_eq!(inside.get("force"), 0, "a force stayed");
 }
 
-/// What a wire's digits change of a force, uN.
-const ROUNDED: i64 = 50_000;
+/// What the port allows from one command to the next, uN.
+const SLEW: i64 = 500_000;
 /// Writes that a busy machine may have on the way when a tick is made.
 const ON_THE_WAY: i64 = 8;
 
@@ -191,7 +194,7 @@ impl Stage {
         loop {
             thread::sleep(ms(1));
             let writes = inside.get("writes");
-            let has_it = (inside.get("force") - ticked).abs() < ROUNDED;
+            let has_it = (inside.get("force") - ticked).abs() <= self.rounded;
             if has_it || writes >= before + ON_THE_WAY {
                 self.lost_at = None;
                 return;
@@ -265,6 +268,7 @@ pub fn no_write_jumps(choice: &str, inside: &dyn Inside, faults: &Faults) {
     let allowed = faults.allowed;
     let mut stage = Stage::new(choice, Rearm::Automatic);
     stage.floor = (faults.floor, 1000.0);
+    stage.rounded = (allowed - SLEW) / 2;
     for &mode in faults.modes {
         for &ticks in faults.ticks {
             stage.until_pressed(inside);
