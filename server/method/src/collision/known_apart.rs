@@ -1,6 +1,7 @@
 //! Motions along which bodies are known to be apart, from one search to the next.
 //!
-//! A search that begins where the last one ended need not look again whether the surfaces cross.
+//! A search that begins where the last one ended need not look again whether the surfaces cross, whichever of the two moved then, about whatever
+//! point.
 
 use arrayvec::ArrayVec;
 
@@ -56,12 +57,14 @@ impl KnownApart {
         self.newest_serves = false;
     }
 
-    /// Whether the meshes are known to be apart with the body there; `radius` bounds the distance of its points from G, m.
-    pub(super) fn knows(&mut self, key: [u64; 2], body: &Placement, radius: f64) -> bool {
-        let found = self
-            .motions
-            .iter()
-            .position(|known| known.key == key && known.holds(body, radius));
+    /// Whether the meshes are known to be apart with the body there; the radii bound the distance of the body's points from G, and of the obstacle's
+    /// from its origin, m.
+    pub(super) fn knows(&mut self, key: [u64; 2], body: &Placement, radii: [f64; 2]) -> bool {
+        let (turned, obstacle) = ([key[1], key[0]], body.inverse());
+        let found = self.motions.iter().position(|known| {
+            known.key == key && known.holds(body, radii[0])
+                || known.key == turned && known.holds(&obstacle, radii[1])
+        });
         if let Some(index) = found {
             self.motions[..=index].rotate_right(1);
         }
@@ -72,6 +75,9 @@ impl KnownApart {
 
 impl Known {
     fn holds(&self, body: &Placement, radius: f64) -> bool {
+        let about = self.motion.about_reference(body);
+        let radius = radius + (about.center - body.center).norm();
+        let body = &about;
         [self.until, self.motion.time_nearest(body), 0.0]
             .iter()
             .any(|time| {
@@ -89,6 +95,7 @@ mod tests {
     use nalgebra::{Point3, Vector3};
 
     const KEY: [u64; 2] = [1, 2];
+    const RADII: [f64; 2] = [0.1, 0.3];
 
     #[test]
     fn where_a_motion_ends_and_on_its_way_bodies_are_known_apart_and_nowhere_else() {
@@ -111,17 +118,50 @@ mod tests {
             };
             let relative = RelativeMotion::new(&motion, &obstacle);
             let first = relative.at(0.0);
-            assert_eq!(known.knows(KEY, &first, 0.1), k > 0, "{k}");
-            assert!(!known.knows([1, 3], &first, 0.1));
+            assert_eq!(known.knows(KEY, &first, RADII), k > 0, "{k}");
+            assert!(!known.knows([1, 3], &first, RADII));
             let until = 0.3 + 0.7 * u.sin().abs();
-            assert_eq!(known.knows(KEY, &first, 0.1), k > 0);
+            assert_eq!(known.knows(KEY, &first, RADII), k > 0);
             known.remember(KEY, &relative, until, 1e-6);
-            assert!(!known.knows(KEY, &relative.at(until + 0.01), 0.1));
+            assert!(!known.knows(KEY, &relative.at(until + 0.01), RADII));
             assert_eq!(known.motions.len(), 1);
             // To the end, or part of the way, as when another obstacle is met first; through the body's own pose.
             let made = if k % 3 == 0 { 0.6 * until } else { until };
             let own = from_reference_point(&motion.pose_at(made), &point);
             start = at_reference_point(&own, &point);
+        }
+    }
+
+    #[test]
+    fn what_one_mesh_has_shown_by_its_motion_the_other_knows_about_whatever_point() {
+        let mut known = KnownApart::default();
+        let mut poses = [
+            Pose::new(Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, 0.3, 0.2)),
+            Pose::new(Vector3::new(0.3, -2.0, 0.1), Vector3::new(0.4, 0.2, -1.0)),
+        ];
+        for k in 0..200_usize {
+            let (u, moving) = (k as f64, k % 2);
+            let (still, key) = (1 - moving, [moving as u64, 1 - moving as u64]);
+            let point = Point3::new(0.01 * u.sin(), -0.02, 0.03 * u.cos());
+            let motion = Motion {
+                start: at_reference_point(&poses[moving], &point),
+                displacement: six(
+                    &Vector3::new(1e-3 * u.cos(), 2e-3, 1e-4),
+                    &Vector3::new(0.003 * u.sin(), 0.005, 0.002 * u.cos()),
+                ),
+                reference_point: point,
+            };
+            let relative = RelativeMotion::new(&motion, &poses[still]);
+            let first = relative.at(0.0);
+            assert_eq!(known.knows(key, &first, RADII), k > 0, "{k}");
+            known.remember(key, &relative, 0.8, 1e-6);
+            assert_eq!(known.motions.len(), 1);
+            let beyond = relative.at(0.81);
+            assert!(!known.knows(key, &beyond, RADII));
+            assert!(!known.knows([key[1], key[0]], &beyond.inverse(), RADII));
+            // To the end, or part of the way.
+            let made = if k % 3 == 0 { 0.6 } else { 0.8 };
+            poses[moving] = from_reference_point(&motion.pose_at(made), &point);
         }
     }
 }

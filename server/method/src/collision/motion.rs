@@ -63,6 +63,17 @@ impl Placement {
         (self.center - other.center).norm() + (self.rotation - other.rotation).norm() * radius
     }
 
+    /// The obstacle as seen from the body, about its origin.
+    pub(super) fn inverse(&self) -> Self {
+        let rotation = self.rotation.transpose();
+        let origin = -(rotation * self.origin);
+        Self {
+            rotation,
+            origin,
+            center: origin,
+        }
+    }
+
     /// A point of the body, obstacle frame.
     #[inline]
     pub(crate) fn point(&self, in_body: &Point3<f64>) -> Point3<f64> {
@@ -95,6 +106,12 @@ impl RelativeMotion {
             origin: center - rotation * self.reference_point.coords,
             center,
         }
+    }
+
+    /// The body where it is, about this motion's G.
+    pub(super) fn about_reference(&self, body: &Placement) -> Placement {
+        let center = body.point(&self.reference_point).coords;
+        Placement { center, ..*body }
     }
 
     /// The time at which G, or without a path the rotation, is nearest to that of `body`.

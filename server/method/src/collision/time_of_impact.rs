@@ -23,6 +23,7 @@
 //!
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
+use nalgebra::Point3;
 use pulp::{Simd, WithSimd};
 
 use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
@@ -216,7 +217,8 @@ impl Problem<'_> {
         work: &mut Work,
     ) -> bool {
         let start = self.relative.at(0.0);
-        if workspace.apart.knows(self.key(), &start, radius) {
+        let radii = [radius, self.obstacle.radius_bound_about(&Point3::origin())];
+        if workspace.apart.knows(self.key(), &start, radii) {
             return false;
         }
         let trees = (self.body.wide_tree(), self.obstacle.wide_tree());
