@@ -5,10 +5,11 @@
 //! in `new`; a part costs the copy of its rows.
 
 use crate::{
-    constraints::{ConstraintPart, ConstraintSet, MAX_PARTS, PART_HEAD_BYTES},
+    constraints::{ConstraintPart, ConstraintSet, MAX_PARTS, PART_HEAD_BYTES, SET_PAUSED, SetHead},
     header::MAX_PAYLOAD_BYTES,
 };
 use arrayvec::ArrayVec;
+use std::cmp::Ordering;
 
 /// Sets that may be on their way at once: jitter of 8 ms at 1 kHz.
 pub const SLOTS: usize = 8;
@@ -130,10 +131,7 @@ impl Assembler {
         match self.newest {
             Some(newest) if sequence < newest => return PartTaken::Overtaken,
             Some(newest) if sequence == newest => {
-                // The same rows for a newer reading, or other flags, which no rows depend on; of two that change places the newer one counts.
-                if part.head.device_ns >= self.whole.head.device_ns {
-                    self.whole.head = part.head;
-                }
+                self.whole.head.renew(&part.head);
                 return PartTaken::Repeated;
             }
             _ => {}
@@ -184,6 +182,20 @@ impl Assembler {
     }
 }
 
+impl SetHead {
+    /// Takes another head of the same set: the same rows for a newer reading, or other flags, which no rows depend on. Of two that change places on
+    /// the way the newer one counts, and of two for the same reading the one that gives no force.
+    fn renew(&mut self, other: &SetHead) {
+        let paused = match other.device_ns.cmp(&self.device_ns) {
+            Ordering::Less => return,
+            Ordering::Equal => self.flags & SET_PAUSED,
+            Ordering::Greater => 0,
+        };
+        *self = *other;
+        self.flags |= paused;
+    }
+}
+
 impl Slot {
     /// Whether `part` is of the set that is here; a free slot fits any.
     fn fits(&self, part: &ConstraintPart) -> bool {
@@ -200,8 +212,9 @@ impl Slot {
             self.set.rows.clear();
             let rows = usize::from(part.rows_in_set);
             self.set.rows.resize(rows, Default::default());
+            self.set.head = part.head;
         }
-        self.set.head = part.head;
+        self.set.head.renew(&part.head);
         let first = usize::from(part.first_row);
         // Within: the decoder has compared the run with the number of rows.
         self.set.rows[first..first + part.rows.len()].copy_from_slice(&part.rows);

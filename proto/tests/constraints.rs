@@ -6,7 +6,9 @@ use proptest::prelude::*;
 use taut_proto::{
     Assembler, ConstraintPart, ConstraintSet, DecodeError, Division, Kind, PartTaken, Payload,
     constraint_parts::SLOTS,
-    constraints::{ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowSeparation, SetHead},
+    constraints::{
+        ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowSeparation, SET_PAUSED, SetHead,
+    },
     header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
 };
@@ -107,6 +109,32 @@ fn a_set_sent_twice_makes_up_for_what_was_lost_and_a_repeat_is_a_sign_of_life() 
     use PartTaken::{Repeated, Waiting, Whole};
     assert_eq!(taken, [Waiting, Waiting, Waiting, Whole, Repeated]);
     assert_eq!(assembler.newest(), Some(&set));
+}
+
+#[test]
+fn a_pause_holds_until_a_newer_reading_whatever_changes_places() {
+    let head = |reading: u64, flags: u8| {
+        let mut set = set(1, 60);
+        (set.head.device_ns, set.head.flags) = (reading, flags);
+        parts(&set)
+    };
+    let (given, paused) = (head(10, 0), head(10, SET_PAUSED));
+    let (older, newer) = (head(9, 0), head(11, 0));
+    let flags = |assembler: &Assembler| assembler.newest().expect("whole").head.flags;
+    // On its way, and whole.
+    let mut assembler = Assembler::new();
+    for part in [&given[0], &paused[1], &older[0], &given[2]] {
+        assembler.take(part);
+    }
+    assert_eq!(flags(&assembler), SET_PAUSED);
+    for part in [&given[0], &older[1], &given[2]] {
+        assert_eq!(assembler.take(part), PartTaken::Repeated);
+        assert_eq!(flags(&assembler), SET_PAUSED);
+    }
+    assert_eq!(assembler.take(&newer[1]), PartTaken::Repeated);
+    assert_eq!(flags(&assembler), 0);
+    assembler.take(&paused[0]);
+    assert_eq!(flags(&assembler), 0, "of an older reading");
 }
 
 #[test]
