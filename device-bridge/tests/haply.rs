@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
-use crate::support::floor::{Dice, OnFloor, ms, wait_until};
+use crate::support::floor::{Dice, OnFloor, floor, ms, wait_until};
 use crate::support::stage::{Faults, HANGS, Inside, UNPLUGGED, VICE, no_write_jumps};
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3, Vector6};
 use taut_bridge::haply::{
@@ -21,10 +21,6 @@ use taut_bridge::{
 
 /// Above everything that is tested.
 const SERVICE_PRIORITY: u8 = 85;
-/// Of the wall below the start, N/m.
-const STIFFNESS: f64 = 200.0;
-/// Its depth below the start, m.
-const DEPTH: f64 = 0.02;
 
 fn placement() -> Placement {
     Placement::plain(
@@ -47,14 +43,8 @@ fn settings(address: SocketAddr) -> HaplySettings {
     }
 }
 
-/// The wall's wrench, with a torque that nobody can render.
-fn wall(pose: &Pose) -> Vector6<f64> {
-    let below = (0.1 - DEPTH - pose.translation.vector.z).max(0.0);
-    Vector6::new(0.0, 0.0, STIFFNESS * below, 0.3, 0.0, 0.0)
-}
-
 fn at_wall(device: ArmDevice) -> OnFloor {
-    OnFloor::new(Box::new(device), &placement(), wall)
+    OnFloor::new(Box::new(device), &placement(), floor)
 }
 
 #[test]

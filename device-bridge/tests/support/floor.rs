@@ -21,12 +21,14 @@ pub fn ms(time: u64) -> Duration {
 pub struct OnFloor {
     pub port: DevicePort,
     floor: fn(&Pose) -> Vector6<f64>,
+    /// The highest place so far, m. A hand on its way down and up may be anywhere when a busy machine makes the first tick.
+    top: f64,
     /// The virtual clock, ms.
     time: u64,
 }
 
 impl OnFloor {
-    /// `floor` is the wrench at a pose; a torque of it is one that nobody can render.
+    /// `floor` is the wrench at a pose whose heights count from the highest place so far; a torque of it is one that nobody can render.
     pub fn new(
         device: Box<dyn Device>,
         placement: &Placement,
@@ -38,15 +40,19 @@ impl OnFloor {
         Self {
             port,
             floor,
+            top: f64::NEG_INFINITY,
             time: 0,
         }
     }
 
     /// The fault, and the force on the device, N.
     pub fn tick(&mut self, now: Duration) -> (Option<DeviceFault>, f64) {
-        let floor = self.floor;
+        let Self { floor, top, .. } = self;
         let report = self.port.tick(now, |reading| {
-            Some(Command::fresh(now, floor(&reading.sample.pose)))
+            let mut pose = reading.sample.pose;
+            *top = top.max(pose.translation.vector.z);
+            pose.translation.vector.z -= *top;
+            Some(Command::fresh(now, floor(&pose)))
         });
         assert_eq!(report.wrench.fixed_rows::<3>(3).norm(), 0.0, "a torque");
         (report.reading.fault, report.wrench.norm())
@@ -134,7 +140,7 @@ pub fn placement() -> Placement {
     Placement::plain(Pose::identity(), Point3::origin())
 }
 
-/// A floor 20 mm below the start, with a torque that no arm can render.
+/// A floor 20 mm below the top, with a torque that no arm can render.
 pub fn floor(pose: &Pose) -> Vector6<f64> {
     let below = (-0.02 - pose.translation.vector.z).max(0.0);
     Vector6::new(0.0, 0.0, 200.0 * below, 0.0, 0.4, 0.0)
