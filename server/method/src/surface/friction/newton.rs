@@ -10,10 +10,10 @@
 //! | G(y)        |              | m kg^(1/2) | `y - sum j lambda(y)`: zero where forces balance                     |
 //!
 //! What gives by a share 1/r of `lambda - lambda_0` leaves no contact's share open, however many there are and in whatever order they come. Where that is found,
-//! `lambda` becomes `lambda_0` and the contacts are solved again, stiffer: they give less each time. A stiffness that does it
-//! at once leaves the iteration going round where contacts hardly slip. It is
-//! converged when the slip and penetration that the compliance allows count as none. The first step takes the contacts that lambda_0 loads for the loaded ones, whatever y says: y is of the
-//! sample before, where the hand pressed less or more. A contact whose slip turns back within a step is taken as stuck in the next.
+//! `lambda` becomes `lambda_0` and the contacts are solved again, stiffer: they give less each time. A stiffness that does it at once leaves the
+//! iteration going round where contacts hardly slip. It is converged when the slip and penetration that the compliance allows count as none.
+//! The first step takes the contacts that lambda_0 loads for the loaded ones, whatever y says: y is of the sample before, where the hand pressed less
+//! or more. A contact whose slip turns back within a step is taken as stuck in the next.
 //! Source: Alart and Curnier 1991, in six unknowns; Simo and Laursen 1992 (augmented Lagrangian of friction); Bertsekas 1982, Section 2.2 (growing stiffness).
 
 use pulp::{Arch, Simd, WithSimd};
@@ -271,7 +271,8 @@ impl WithSimd for Balance<'_> {
                 let change = add_scaled(&change, &rows.tangents[1], grip[1] - contact.grip[1]);
                 let change = dot(&change, &change);
                 given = given.max(change);
-                // A unit of slip or penetration is a whitened length of the root of the step, or less.
+                // In m by the length of the normal's row: exact for penetration; a slip counts less where the tangents' rows are longer, as at the
+                // end of a lever. What that leaves too much the second projection shows.
                 slip = slip.max(change / contact.normal_step);
                 contact.load = reaction.load;
                 contact.grip = grip;
