@@ -53,8 +53,10 @@ pub fn opened(choice: &str) -> Result<Box<dyn Device>, String> {
 pub struct Stage {
     pub port: DevicePort,
     pub time: u64,
-    /// Height of a floor, m, and its stiffness, N/m.
+    /// Height of a floor from the highest place so far, m, and its stiffness, N/m.
     pub floor: (f64, f64),
+    /// The highest place so far, m. A hand on its way down and up may be anywhere when a busy machine makes the first tick.
+    top: f64,
     /// How many writes a line had made when it was lost.
     lost_at: Option<i64>,
     /// Up to this difference, uN, a device has the force that it was told: what its digits may change, and no more than is allowed beside the slew.
@@ -78,6 +80,7 @@ impl Stage {
             port,
             time: 1000,
             floor: (-0.02, 200.0),
+            top: f64::NEG_INFINITY,
             lost_at: None,
             rounded: 0,
             ticked: Instant::now(),
@@ -85,15 +88,18 @@ impl Stage {
         }
     }
 
-    /// A floor below the start, which also turns the hand.
+    /// The floor also turns the hand.
     pub fn tick(&mut self) -> (Option<DeviceFault>, f64) {
         self.time += 1;
         let now = ms(self.time);
         self.longest_gap = self.longest_gap.max(self.ticked.elapsed());
         self.ticked = Instant::now();
+        let Self { port, top, .. } = self;
         let (floor, stiffness) = self.floor;
-        let report = self.port.tick(now, |reading| {
-            let below = (floor - reading.sample.pose.translation.vector.z).max(0.0);
+        let report = port.tick(now, |reading| {
+            let height = reading.sample.pose.translation.vector.z;
+            *top = top.max(height);
+            let below = (*top + floor - height).max(0.0);
             let wrench = Vector6::new(0.0, 0.0, stiffness * below, 20.0 * below, 0.0, 0.0);
             Some(Command::fresh(now, wrench))
         });
@@ -242,7 +248,7 @@ pub struct Faults {
     pub modes: &'static [i64],
     /// For how long, ms.
     pub ticks: &'static [u64],
-    /// Height of a floor of 1000 N/m over the place where the device was found, m. A hand in a vice does not move: 3 mm are 3 N.
+    /// Height of a floor of 1000 N/m from the highest place so far, m. A hand in a vice does not move: 3 mm are 3 N.
     pub floor: f64,
     /// uN from one write to the next: 0.5 N/ms, and rounding.
     pub allowed: i64,
