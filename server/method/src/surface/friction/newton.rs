@@ -266,14 +266,15 @@ impl WithSimd for Balance<'_> {
             let (mut given, mut slip) = (0.0_f64, 0.0_f64);
             for ((rows, contact), reaction) in rows.iter().zip(&mut *contacts).zip(&reactions) {
                 let grip = reaction.grip();
-                let change = scaled(&rows.normal, reaction.load - contact.load);
-                let change = add_scaled(&change, &rows.tangents[0], grip[0] - contact.grip[0]);
-                let change = add_scaled(&change, &rows.tangents[1], grip[1] - contact.grip[1]);
-                let change = dot(&change, &change);
-                given = given.max(change);
-                // In m by the length of the normal's row: exact for penetration; a slip counts less where the tangents' rows are longer, as at the
-                // end of a lever. What that leaves too much the second projection shows.
-                slip = slip.max(change / contact.normal_step);
+                let load = reaction.load - contact.load;
+                let pulls = [0, 1].map(|i| grip[i] - contact.grip[i]);
+                let change = scaled(&rows.normal, load);
+                let change = add_scaled(&change, &rows.tangents[0], pulls[0]);
+                let change = add_scaled(&change, &rows.tangents[1], pulls[1]);
+                given = given.max(dot(&change, &change));
+                let [u, v] = pulls.map(|pull| pull / contact.tangent_step);
+                let sunk = load / contact.normal_step;
+                slip = slip.max(sunk * sunk + u * u + v * v);
                 contact.load = reaction.load;
                 contact.grip = grip;
             }
