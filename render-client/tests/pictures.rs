@@ -1,12 +1,15 @@
 //! What the pictures show, measured in their pixels. Skipped, said aloud, without an adapter.
 
+use std::time::Instant;
+
 use taut_proto::scene::Show;
 use taut_proto::scene::Stereo;
 
 use crate::support::{canvas, peg_in_hole, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Vector3};
-use taut_render::renderer::shapes;
+use taut_render::canvas::Canvas;
+use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::{Stage, StageBody, StageScreen, TriangleMesh};
 use taut_render::timeline::{Contact, Latched};
 use taut_render::view::{ClipPlanes, Eye, Eyes, project};
@@ -68,6 +71,46 @@ fn pixel_of(stage: &Stage, screen: usize, eye: Eye, point: Point3<f64>) -> (f64,
     let seen = project(&clip, &point).expect("in front");
     let across = (0.5 + 0.5 * seen.x) * f64::from(pixels.0);
     (across, (0.5 - 0.5 * seen.y) * f64::from(pixels.1))
+}
+
+#[test]
+fn the_adapter_tells_how_long_it_took_for_each_pass() {
+    let gpu = match Gpu::open() {
+        Ok(gpu) => gpu.with_pass_times(),
+        Err(error) => return taut_test_kit::left_out(error),
+    };
+    if !gpu.times_passes() {
+        return taut_test_kit::left_out("this adapter has no clock");
+    }
+    let mut stage = peg_in_hole(PIXELS, Stereo::Anaglyph);
+    stage.screens.truncate(1);
+    let mut canvas = Canvas::new(gpu, stage);
+    let drawing = ["picture", "picture", "anaglyph"];
+    let mut hand = 0.0;
+    for shadows in [
+        vec!["standing shadows", "moving shadows"],
+        vec![],
+        vec!["moving shadows"],
+    ] {
+        if !shadows.is_empty() {
+            hand += 1e-4;
+        }
+        let begun = Instant::now();
+        canvas
+            .draw(
+                &state(Isometry3::translation(0.0, -0.05 - hand, 0.0)),
+                Show::default(),
+                false,
+            )
+            .expect("drawn");
+        let wall = 1e3 * begun.elapsed().as_secs_f64();
+        let times = canvas.gpu().pass_times().expect("read back");
+        let (names, ms): (Vec<&str>, Vec<f64>) = times.into_iter().unzip();
+        assert_eq!(names, [shadows, drawing.to_vec()].concat());
+        let possible = |ms: &f64| (0.0..=wall).contains(ms);
+        assert!(ms.iter().all(possible), "{ms:?} of {wall} ms");
+        assert!(ms.iter().sum::<f64>() > 0.0);
+    }
 }
 
 #[test]

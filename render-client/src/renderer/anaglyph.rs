@@ -1,5 +1,6 @@
 //! Lays the two eyes' pictures over each other for red and cyan glasses.
 
+use super::gpu::Gpu;
 use super::pipeline::{output_pass, to_output};
 
 /// The pipeline that combines two pictures into one of `format`.
@@ -36,11 +37,12 @@ impl Anaglyph {
     /// Draws the combined picture.
     pub(crate) fn draw(
         &self,
+        gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         eyes: &wgpu::BindGroup,
         target: &wgpu::TextureView,
     ) {
-        let mut pass = output_pass(encoder, "anaglyph", target);
+        let mut pass = output_pass(gpu, encoder, "anaglyph", target);
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, eyes, &[]);
         pass.draw(0..3, 0..1);

@@ -265,13 +265,13 @@ impl Renderer {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let (moving, standing) = self.plan.casters.split_at(self.plan.moving);
         if !stands {
-            let mut pass = self.shadow.begin_standing(&mut encoder);
+            let mut pass = self.shadow.begin_standing(gpu, &mut encoder);
             pass.set_vertex_buffer(1, self.instances.slice(..));
             self.draw_batches(&mut pass, standing);
             self.shadow_passes += 1;
         }
         {
-            let mut pass = self.shadow.begin_moving(&mut encoder);
+            let mut pass = self.shadow.begin_moving(gpu, &mut encoder);
             pass.set_vertex_buffer(1, self.instances.slice(..));
             self.draw_batches(&mut pass, moving);
         }
@@ -317,11 +317,11 @@ impl Renderer {
         if let Some(combined) = &picture.anaglyph {
             for (view, seen) in picture.views.iter().zip(&seen) {
                 let own = view.own.as_ref().unwrap_or(target);
-                draw_eye(&mut begin(encoder, picture, own), view, *seen);
+                draw_eye(&mut begin(gpu, encoder, picture, own), view, *seen);
             }
-            self.anaglyph.draw(encoder, combined, target);
+            self.anaglyph.draw(gpu, encoder, combined, target);
         } else {
-            let mut pass = begin(encoder, picture, target);
+            let mut pass = begin(gpu, encoder, picture, target);
             for (view, seen) in picture.views.iter().zip(&seen) {
                 draw_eye(&mut pass, view, *seen);
             }
@@ -468,6 +468,7 @@ fn pixels_of(view: &ViewTarget, (width, height): (u32, u32)) -> [u32; 4] {
 
 /// Begins the main pass of a picture, cleared to black.
 fn begin<'a>(
+    gpu: &Gpu,
     encoder: &'a mut wgpu::CommandEncoder,
     picture: &PictureTarget,
     target: &wgpu::TextureView,
@@ -495,6 +496,7 @@ fn begin<'a>(
             }),
             stencil_ops: None,
         }),
+        timestamp_writes: gpu.timed("picture"),
         ..Default::default()
     })
 }

@@ -1,5 +1,6 @@
 //! The adapter and device that a node draws with.
 
+use super::pass_times::PassTimes;
 use crate::error::RenderError;
 
 /// An open graphics device.
@@ -17,6 +18,7 @@ pub struct Gpu {
     reason: String,
     others: Vec<AdapterSummary>,
     most_samples: u32,
+    pass_times: Option<PassTimes>,
 }
 
 /// Samples per pixel where they smooth edges.
@@ -126,6 +128,7 @@ impl Gpu {
 
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("taut-render"),
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits()),
             ..Default::default()
         };
@@ -144,6 +147,7 @@ impl Gpu {
             reason,
             others,
             most_samples: SMOOTH,
+            pass_times: None,
         };
         tracing::info!("drawing with {}", gpu.chosen());
         Ok(gpu)
@@ -164,6 +168,49 @@ impl Gpu {
             _ => SMOOTH,
         };
         self.with_samples(asked.unwrap_or(most))
+    }
+
+    /// The same, timing each pass, where the adapter can.
+    pub fn with_pass_times(self) -> Self {
+        Self {
+            pass_times: PassTimes::new(&self.device),
+            ..self
+        }
+    }
+
+    /// Whether passes are timed.
+    pub fn times_passes(&self) -> bool {
+        self.pass_times.is_some()
+    }
+
+    /// Waits for what is being drawn. Names of the passes since the last call, in their order, and how long the card took for each, ms; nothing
+    /// where passes are not timed.
+    pub fn pass_times(&self) -> Result<Vec<(&'static str, f64)>, RenderError> {
+        self.pass_times
+            .as_ref()
+            .map_or_else(|| Ok(Vec::new()), |times| times.take(self))
+    }
+
+    /// For the descriptor of a pass of this name.
+    pub(crate) fn timed(&self, name: &'static str) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
+        self.pass_times.as_ref().and_then(|times| times.of(name))
+    }
+
+    /// What a buffer holds once everything submitted so far is done; to be unmapped by the caller.
+    pub(crate) fn read(&self, buffer: &wgpu::Buffer) -> Result<wgpu::BufferView, RenderError> {
+        let (done, mapped) = std::sync::mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+            let _ = done.send(result); // nobody listens only if the wait below failed
+        });
+        self.finish()?;
+        match mapped.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(self.broken(&error)),
+            Err(error) => return Err(self.broken(&error)),
+        }
+        buffer
+            .get_mapped_range(..)
+            .map_err(|error| self.broken(&error))
     }
 
     /// What to tell people of the adapter.

@@ -83,7 +83,7 @@ impl Instance {
 
 impl MeshBuffers {
     pub(crate) fn new(device: &wgpu::Device, mesh: &TriangleMesh) -> Self {
-        let shaded = shade(mesh);
+        let shaded = shade(mesh).in_drawing_order();
         let vertex = |&(position, normal)| Vertex {
             position,
             normal: folded(normal),

@@ -15,6 +15,7 @@ mod gpu;
 mod mesh;
 mod obstacles;
 mod overlay;
+mod pass_times;
 mod picture;
 mod pipeline;
 mod shadow;

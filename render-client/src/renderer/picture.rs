@@ -171,23 +171,9 @@ impl OffScreen {
     /// The picture of the last copy that was submitted; waits for it.
     pub fn read(&self, gpu: &Gpu) -> Result<image::RgbaImage, RenderError> {
         let (width, height) = self.size;
-        let (done, mapped) = std::sync::mpsc::channel();
-        self.readback
-            .map_async(wgpu::MapMode::Read, .., move |result| {
-                let _ = done.send(result); // nobody listens only if the wait below failed
-            });
-        gpu.finish()?;
-        match mapped.try_recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => return Err(gpu.broken(&error)),
-            Err(error) => return Err(gpu.broken(&error)),
-        }
         let mut pixels = Vec::with_capacity(4 * width as usize * height as usize);
         {
-            let rows = self
-                .readback
-                .get_mapped_range(..)
-                .map_err(|error| gpu.broken(&error))?;
+            let rows = gpu.read(&self.readback)?;
             for row in rows.chunks(self.padded_row as usize) {
                 pixels.extend_from_slice(&row[..4 * width as usize]);
             }

@@ -265,8 +265,9 @@ pub(crate) fn to_output(
 
 /// A pass that draws to an output anew, black where nothing is drawn.
 pub(crate) fn output_pass<'e>(
+    gpu: &Gpu,
     encoder: &'e mut wgpu::CommandEncoder,
-    label: &str,
+    label: &'static str,
     target: &wgpu::TextureView,
 ) -> wgpu::RenderPass<'e> {
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -280,6 +281,7 @@ pub(crate) fn output_pass<'e>(
                 store: wgpu::StoreOp::Store,
             },
         })],
+        timestamp_writes: gpu.timed(label),
         ..Default::default()
     })
 }

@@ -4,6 +4,7 @@
 //! god-object drawn into the copy; while nothing moves, nothing is drawn.
 
 use super::frame::KeyLight;
+use super::gpu::Gpu;
 use super::mesh::buffer_layouts;
 use super::pipeline::{DEPTH, Output, attachment, shader};
 
@@ -76,14 +77,22 @@ impl ShadowMap {
     /// Begins the pass of what stands; the caller sets the instances and draws.
     pub(crate) fn begin_standing<'a>(
         &self,
+        gpu: &Gpu,
         encoder: &'a mut wgpu::CommandEncoder,
     ) -> wgpu::RenderPass<'a> {
-        self.begin(encoder, &self.standing_view, wgpu::LoadOp::Clear(1.0))
+        let cleared = wgpu::LoadOp::Clear(1.0);
+        self.begin(
+            gpu,
+            encoder,
+            ("standing shadows", &self.standing_view),
+            cleared,
+        )
     }
 
     /// Begins the pass of what moves, over what stands.
     pub(crate) fn begin_moving<'a>(
         &self,
+        gpu: &Gpu,
         encoder: &'a mut wgpu::CommandEncoder,
     ) -> wgpu::RenderPass<'a> {
         encoder.copy_texture_to_texture(
@@ -91,17 +100,23 @@ impl ShadowMap {
             self.map.as_image_copy(),
             self.map.size(),
         );
-        self.begin(encoder, &self.view, wgpu::LoadOp::Load)
+        self.begin(
+            gpu,
+            encoder,
+            ("moving shadows", &self.view),
+            wgpu::LoadOp::Load,
+        )
     }
 
     fn begin<'a>(
         &self,
+        gpu: &Gpu,
         encoder: &'a mut wgpu::CommandEncoder,
-        view: &wgpu::TextureView,
+        (label, view): (&'static str, &wgpu::TextureView),
         load: wgpu::LoadOp<f32>,
     ) -> wgpu::RenderPass<'a> {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("shadow"),
+            label: Some(label),
             color_attachments: &[],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view,
@@ -111,6 +126,7 @@ impl ShadowMap {
                 }),
                 stencil_ops: None,
             }),
+            timestamp_writes: gpu.timed(label),
             ..Default::default()
         });
         pass.set_pipeline(&self.pipeline);

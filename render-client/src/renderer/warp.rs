@@ -87,12 +87,13 @@ impl WarpPipeline {
     /// Draws scenes, warped, each into its pixels of `target`: left, top, width, height.
     pub(crate) fn draw<'s>(
         &self,
+        gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         warp: &WarpTarget,
         scenes: impl IntoIterator<Item = (&'s SceneTexture, [u32; 4])>,
         target: &wgpu::TextureView,
     ) {
-        let mut pass = output_pass(encoder, "warp", target);
+        let mut pass = output_pass(gpu, encoder, "warp", target);
         pass.set_pipeline(&self.pipeline);
         pass.set_vertex_buffer(0, warp.vertices.slice(..));
         pass.set_index_buffer(warp.indices.slice(..), wgpu::IndexFormat::Uint32);

@@ -72,16 +72,16 @@ impl Renderer {
             for (view, scene) in picture.views.iter().zip(warp.scenes()) {
                 let own = view.own.as_ref().unwrap_or(target);
                 let whole = [(scene, [0, 0, width, height])];
-                self.warp.draw(encoder, warp, whole, own);
+                self.warp.draw(gpu, encoder, warp, whole, own);
             }
-            self.anaglyph.draw(encoder, combined, target);
+            self.anaglyph.draw(gpu, encoder, combined, target);
         } else {
             let parts = picture
                 .views
                 .iter()
                 .map(|view| pixels_of(view, picture.size));
             self.warp
-                .draw(encoder, warp, warp.scenes().iter().zip(parts), target);
+                .draw(gpu, encoder, warp, warp.scenes().iter().zip(parts), target);
         }
     }
 }
