@@ -40,7 +40,7 @@ fn main() -> anyhow::Result<()> {
         .map(|mesh| ("", mesh))
         .chain([("scattered", last)]);
     println!(
-        "triangles             kind    wall p50     p99     most       card p50     p99     of it, p50"
+        "triangles             kind  drawn, M   wall p50     p99     most       card p50     p99     of it, p50"
     );
     for (place, (order, mesh)) in rows.enumerate() {
         let gpu = Gpu::open()?.with_samples(samples).with_pass_times();
@@ -62,8 +62,11 @@ fn row(gpu: Gpu, order: &str, mesh: TriangleMesh, frames: usize) -> anyhow::Resu
     let mut canvas = Canvas::new(gpu, stage);
     canvas.gpu().finish()?;
     let ready = begun.elapsed().as_secs_f64();
+    let begun = Instant::now();
+    canvas.wait_for_levels();
+    let levels = begun.elapsed().as_secs_f64();
     for (kind, name) in KINDS.into_iter().enumerate() {
-        let (mut wall, mut card) = (Vec::new(), Vec::new());
+        let (mut wall, mut card, mut drawn) = (Vec::new(), Vec::new(), 0);
         let mut passes: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         for frame in 0..=frames {
             let step = 1e-5 * frame as f64;
@@ -72,9 +75,11 @@ fn row(gpu: Gpu, order: &str, mesh: TriangleMesh, frames: usize) -> anyhow::Resu
             if kind > 1 {
                 latched.state.bodies = vec![(0, Isometry3::translation(0.0, step, 0.0))];
             }
+            let before = canvas.renderer().triangles_drawn();
             let begun = Instant::now();
             canvas.draw(&latched, Show::default(), false)?;
             let took = 1e3 * begun.elapsed().as_secs_f64();
+            drawn = canvas.renderer().triangles_drawn() - before;
             let times = canvas.gpu().pass_times()?;
             if frame == 0 {
                 continue; // brings everything to where it is
@@ -94,7 +99,8 @@ fn row(gpu: Gpu, order: &str, mesh: TriangleMesh, frames: usize) -> anyhow::Resu
             .map(|(pass, ms)| format!("{pass} {:.2}", quantile(ms, 0.5)))
             .collect();
         println!(
-            "{triangles:9} {order:9}   {name:5}   {:6.2}   {:6.2}   {:6.2} ms   {:6.2}   {:6.2} ms   {}",
+            "{triangles:9} {order:9}   {name:5} {:6.2}   {:6.2}   {:6.2}   {:6.2} ms   {:6.2}   {:6.2} ms   {}",
+            1e-6 * drawn as f64,
             quantile(wall.clone(), 0.5),
             quantile(wall.clone(), 0.99),
             quantile(wall, 1.0),
@@ -112,7 +118,7 @@ fn row(gpu: Gpu, order: &str, mesh: TriangleMesh, frames: usize) -> anyhow::Resu
         )
     });
     println!(
-        "          ready after {ready:.2} s; meshes {:.1} MB{memory}",
+        "          ready after {ready:.2} s, its levels of detail {levels:.2} s later; meshes {:.1} MB{memory}",
         1e-6 * canvas.renderer().mesh_bytes() as f64
     );
     Ok(())

@@ -98,6 +98,16 @@ impl Canvas {
         &self.renderer
     }
 
+    /// Waits until the levels of detail of all meshes are made.
+    pub fn wait_for_levels(&mut self) {
+        self.renderer.wait_for_levels(&self.gpu);
+    }
+
+    /// Draws every triangle, however small it is in the picture.
+    pub fn draw_all_triangles(&mut self) {
+        self.renderer.draw_all_triangles();
+    }
+
     /// Draws a state on all screens and waits until that is done.
     ///
     /// With `copy` the pictures can be had from [`Self::images`] afterwards.

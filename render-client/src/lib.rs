@@ -13,6 +13,7 @@ pub mod cli;
 pub mod comfort;
 pub mod correction;
 mod description;
+pub mod detail;
 pub mod environment;
 pub mod error;
 mod film;

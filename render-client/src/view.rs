@@ -255,6 +255,44 @@ impl Eyes {
     }
 }
 
+/// How large a picture shows things, for both eyes of it alike.
+#[derive(Clone, Copy, Debug)]
+pub struct Magnification {
+    /// The middle of the eyes, workbench frame, and how far they are from it, m.
+    eye: Point3<f64>,
+    aside: f64,
+    /// Unit vector along which depth counts, workbench frame.
+    ahead: Vector3<f64>,
+    /// Nothing nearer is drawn, m.
+    near: f64,
+    /// Distance of the screen from the eyes, m, times pixels for a metre of it.
+    pixels: f64,
+}
+
+impl Magnification {
+    /// Of a picture of `screen` that is so many pixels wide.
+    pub fn new(screen: &Screen, eyes: &Eyes, planes: &ClipPlanes, width: u32) -> Self {
+        let eye = eyes.position(Eye::Middle);
+        Self {
+            eye,
+            aside: (eyes.left - eye).norm(),
+            ahead: -screen.normal,
+            near: planes.near,
+            pixels: screen.distance(&eye) * f64::from(width) / screen.width,
+        }
+    }
+
+    /// The most pixels that a metre within a sphere can take, in whatever direction it lies: the norm of the derivative of `D p / depth`.
+    pub fn most_pixels_per_metre(&self, center: &Point3<f64>, radius: f64) -> f64 {
+        let away = center - self.eye;
+        let around = radius + self.aside;
+        let middle = away.dot(&self.ahead);
+        let aside = (away - self.ahead * middle).norm() + around;
+        let depth = (middle - around).max(self.near);
+        self.pixels * depth.hypot(aside) / (depth * depth)
+    }
+}
+
 /// Where a point of the workbench appears, in normalised device coordinates (right and up, ±1 at
 /// the edges of the screen); `None` for a point that is not in front of the eye.
 pub fn project(clip_from_workbench: &Matrix4<f64>, point: &Point3<f64>) -> Option<Point2<f64>> {
@@ -296,6 +334,41 @@ mod tests {
     prop_compose! {
         fn eye()(x in -2.0..2.0, y in -2.0..0.5, z in 0.1..2.0) -> Point3<f64> {
             Point3::new(x, y, z)
+        }
+    }
+
+    proptest! {
+        /// By the derivatives of the projection itself, about points of the sphere.
+        #[test]
+        fn nothing_is_larger_in_the_picture_than_the_magnification_says(
+            eye in prop::array::uniform3(-0.5..0.5), center in prop::array::uniform3(-0.8..0.8),
+            radius in 0.01..0.3, at in prop::array::uniform3(-1.0..1.0), along in prop::array::uniform3(-1.0..1.0),
+            separation in 0.0..0.08,
+        ) {
+            let at = Vector3::from(at);
+            let along = Vector3::from(along);
+            prop_assume!(at.norm() <= 1.0 && along.norm() > 1e-3);
+            let screen = Screen::from_corners([-0.9, 0.0, 0.0].into(), [0.9, 0.0, 0.0].into(), [-0.9, 0.0, 1.2].into())
+                .expect("a rectangle");
+            let head = Isometry3::translation(eye[0], eye[1] - 1.2, 0.6 + eye[2]);
+            let eyes = Eyes::of_head(&head, separation);
+            let planes = ClipPlanes { near: 0.05, far: 20.0 };
+            let (center, width) = (Point3::from(center), 1920);
+            let sight = Magnification::new(&screen, &eyes, &planes, width);
+            let point = center + at * radius;
+            let step = along.normalize() * 1e-6;
+            for eye in [eyes.left, eyes.right] {
+                let depth = screen.distance(&eye) - screen.place(&point).z;
+                prop_assume!(depth >= planes.near);
+                let clip = screen.clip_from_workbench(&eye, &planes).expect("in front");
+                let pixel = |p: Point3<f64>| {
+                    let place = project(&clip, &p).expect("in front").coords;
+                    place.component_mul(&nalgebra::Vector2::new(0.5, 0.5 * 1.2 / 1.8)) * f64::from(width)
+                };
+                let pixels = (pixel(point + step) - pixel(point - step)).norm() / (2.0 * step.norm());
+                let most = sight.most_pixels_per_metre(&center, radius);
+                prop_assert!(pixels <= most * (1.0 + 1e-6), "{pixels} of {most}");
+            }
         }
     }
 

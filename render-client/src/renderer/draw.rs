@@ -3,6 +3,10 @@
 
 mod corrected;
 
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::Receiver;
+use std::sync::{Mutex, PoisonError};
+
 use nalgebra::{Isometry3, Point3};
 use taut_proto::scene::Show;
 
@@ -18,11 +22,13 @@ use super::shadow::ShadowMap;
 use super::warp::WarpPipeline;
 use super::{background, contacts, floor, force, ghost, god_object, mesh, obstacles, shapes};
 use crate::comfort::Comfort;
+use crate::detail::{Detail, UNSEEN_PIXELS, made_beside};
 use crate::hud::Overlay;
-use crate::stage::{Bounds, Stage, StageBody};
+use crate::normals::{Shaded, shade};
+use crate::stage::{Bounds, Stage, StageBody, TriangleMesh};
 use crate::stereo::Picture;
 use crate::timeline::{Latched, State};
-use crate::view::{ClipPlanes, Eye, Eyes, Screen};
+use crate::view::{ClipPlanes, Eye, Eyes, Magnification, Screen};
 
 /// Everything on the graphics card that does not depend on the size of a picture.
 #[derive(Debug)]
@@ -35,17 +41,22 @@ pub struct Renderer {
     shadow: ShadowMap,
     environment: EnvironmentMap,
     meshes: Vec<MeshBuffers>,
+    /// Levels of detail that are still being made, with the places of their meshes.
+    levels: Mutex<Receiver<(usize, Detail)>>,
     mesh_bounds: Vec<Bounds>,
     god_object_box: (Point3<f64>, Point3<f64>),
     instances: wgpu::Buffer,
     floor: Floor,
     clip_planes: ClipPlanes,
     comfort: Comfort,
+    /// Largest error of what is drawn with fewer triangles than it has.
+    unseen_pixels: f64,
     text: OverlayPipeline,
     overlay: Overlay,
     plan: Plan,
     shadowed: Option<Shadowed>,
     shadow_passes: u64,
+    triangles: AtomicU64,
 }
 
 /// What the shadow map shows.
@@ -75,8 +86,8 @@ struct Plan {
     casters: Vec<Batch>,
     /// How many of the first of these are the god-object's: 1 or 0.
     moving: usize,
-    /// Bodies through which others are seen, each with its middle.
-    translucent: Vec<(Point3<f64>, Batch)>,
+    /// Bodies through which others are seen.
+    translucent: Vec<Batch>,
     /// Contact dots and force arrow.
     marks: Vec<Batch>,
     ghost: Option<Batch>,
@@ -103,13 +114,11 @@ impl Renderer {
             translucent: mesh::translucent_pipeline(device, &layout, output),
             ghost: ghost::pipeline(device, &layout, output),
         };
-        let mut meshes: Vec<MeshBuffers> = stage
-            .meshes
-            .iter()
-            .map(|mesh| MeshBuffers::new(device, mesh))
-            .collect();
-        meshes.push(MeshBuffers::new(device, &shapes::sphere(1.0, 20)));
-        meshes.push(MeshBuffers::new(device, &shapes::arrow(0.06, 0.25, 24)));
+        let marks = [shapes::sphere(1.0, 20), shapes::arrow(0.06, 0.25, 24)];
+        let meshes = stage.meshes.iter().map(|mesh| &**mesh).chain(&marks);
+        let shaded: Vec<Shaded> = meshes.map(ordered).collect();
+        let meshes = shaded.iter().map(|of| MeshBuffers::new(device, of));
+        let meshes: Vec<MeshBuffers> = meshes.collect();
         let mesh_bounds: Vec<Bounds> = stage.meshes.iter().map(|mesh| mesh.bounds()).collect();
 
         // Obstacles, god-object, ghost, dots, arrow.
@@ -130,6 +139,7 @@ impl Renderer {
             shadow: ShadowMap::new(device),
             environment: EnvironmentMap::new(gpu, &stage.environment),
             meshes,
+            levels: Mutex::new(made_beside(shaded.into_iter().enumerate().collect())),
             mesh_bounds,
             god_object_box: {
                 let (low, high) = stage.meshes[stage.god_object.mesh].corners();
@@ -139,10 +149,12 @@ impl Renderer {
             floor: Floor::under(&bodies, lowest_point(stage) - 0.004 * bodies.radius),
             clip_planes: stage.clip_planes,
             comfort: stage.comfort,
+            unseen_pixels: UNSEEN_PIXELS,
             text: OverlayPipeline::new(gpu, output),
             overlay: Overlay::default(),
             shadowed: None,
             shadow_passes: 0,
+            triangles: AtomicU64::new(0),
             plan: Plan {
                 light: KeyLight::fit(&bodies, ShadowMap::TEXELS),
                 stale: true,
@@ -170,9 +182,38 @@ impl Renderer {
         PictureTarget::new(gpu, picture, size, *output, layout, maps, anaglyph)
     }
 
+    /// Waits until the levels of detail of all meshes are made.
+    pub fn wait_for_levels(&mut self, gpu: &Gpu) {
+        self.take_levels(gpu, |levels| levels.recv().ok());
+    }
+
+    fn take_levels(
+        &mut self,
+        gpu: &Gpu,
+        next: impl Fn(&Receiver<(usize, Detail)>) -> Option<(usize, Detail)>,
+    ) {
+        let levels = self
+            .levels
+            .get_mut()
+            .unwrap_or_else(PoisonError::into_inner);
+        while let Some((place, detail)) = next(levels) {
+            self.meshes[place].refine(&gpu.device, detail);
+        }
+    }
+
+    /// Draws every triangle, however small it is in the picture.
+    pub fn draw_all_triangles(&mut self) {
+        self.unseen_pixels = 0.0;
+    }
+
     /// Size of all meshes on the graphics card, in bytes.
     pub fn mesh_bytes(&self) -> u64 {
         self.meshes.iter().map(MeshBuffers::bytes).sum()
+    }
+
+    /// How many triangles have been handed to the graphics card so far, shadows among them.
+    pub fn triangles_drawn(&self) -> u64 {
+        self.triangles.load(Ordering::Relaxed)
     }
 
     /// Takes the text that the pictures to come show.
@@ -188,44 +229,47 @@ impl Renderer {
 
     /// Takes the state that the next submission draws; draws its shadow map if a shadow moved.
     pub fn set_state(&mut self, gpu: &Gpu, stage: &Stage, latched: &Latched, show: Show) {
+        self.take_levels(gpu, |levels| levels.try_recv().ok());
         let state = &latched.state;
         let mut list = InstanceList::default();
         let (mut casters, mut translucent) = (Vec::new(), Vec::new());
         let mut bounds = self.bounds(stage, &stage.god_object, &state.god_object);
         let radius = bounds.radius;
-        let mut add = |body: &StageBody, instance, middle| {
-            let batch = list.batch(body.mesh, [instance]);
+        let scale = stage.workbench_from_scene.scaling();
+        let mut add = |body: &StageBody, instance, own| {
+            let batch = list.batch(body.mesh, [instance], own, body.scale * scale);
             if body.opacity >= 1.0 {
                 casters.push(batch);
             } else if body.opacity > 0.0 {
-                translucent.push((middle, batch));
+                translucent.push(batch);
             }
         };
         let god_object = god_object::instance(stage, &state.god_object);
-        add(&stage.god_object, god_object, bounds.center);
+        add(&stage.god_object, god_object, bounds);
         let moving = usize::from(stage.god_object.opacity >= 1.0);
         for body in &stage.obstacles {
             let pose = pose_of(body, state);
             let own = self.bounds(stage, body, pose);
             bounds = bounds.union(&own);
-            add(body, obstacles::instance(stage, body, pose), own.center);
+            add(body, obstacles::instance(stage, body, pose), own);
         }
 
         let (dot, arrow) = (self.meshes.len() - 2, self.meshes.len() - 1);
         let mut marks = Vec::new();
         if show.contacts {
-            marks.push(list.batch(dot, contacts::instances(stage, &state.contacts, radius)));
+            let dots = contacts::instances(stage, &state.contacts, radius);
+            marks.push(list.batch(dot, dots, bounds, 1.0));
         }
         if show.force {
             let pose = &state.god_object;
             let mark = force::instance(stage, pose, &state.force, &self.god_object_box, radius);
-            marks.push(list.batch(arrow, mark));
+            marks.push(list.batch(arrow, mark, bounds, 1.0));
         }
         let ghost = show.ghost.then(|| {
-            list.batch(
-                stage.god_object.mesh,
-                [ghost::instance(stage, &state.device)],
-            )
+            let body = &stage.god_object;
+            let own = self.bounds(stage, body, &state.device);
+            let instance = ghost::instance(stage, &state.device);
+            list.batch(body.mesh, [instance], own, body.scale * scale)
         });
 
         self.plan = Plan {
@@ -264,16 +308,18 @@ impl Renderer {
         self.shadow.aim(&gpu.queue, &self.plan.light);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let (moving, standing) = self.plan.casters.split_at(self.plan.moving);
+        let texels = 1.0 / self.plan.light.texel;
+        let per_metre = |_: &Bounds| texels;
         if !stands {
             let mut pass = self.shadow.begin_standing(gpu, &mut encoder);
             pass.set_vertex_buffer(1, self.instances.slice(..));
-            self.draw_batches(&mut pass, standing);
+            self.draw_batches(&mut pass, standing, &per_metre);
             self.shadow_passes += 1;
         }
         {
             let mut pass = self.shadow.begin_moving(gpu, &mut encoder);
             pass.set_vertex_buffer(1, self.instances.slice(..));
-            self.draw_batches(&mut pass, moving);
+            self.draw_batches(&mut pass, moving, &per_metre);
         }
         gpu.queue.submit([encoder.finish()]);
         self.shadowed = Some(wanted);
@@ -303,7 +349,12 @@ impl Renderer {
             |pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget, seen: Option<Point3<f64>>| {
                 enter(pass, picture, view);
                 match (seen, chart) {
-                    (Some(eye), None) => self.draw_view(pass, view, &eye),
+                    (Some(eye), None) => {
+                        let [_, _, width, _] = pixels_of(view, picture.size);
+                        let planes = &self.clip_planes;
+                        let sight = Magnification::new(screen, eyes, planes, width);
+                        self.draw_view(pass, view, (&eye, &sight));
+                    }
                     (Some(eye), Some(chart)) => {
                         let clip = screen.clip_from_workbench(&eye, &self.clip_planes);
                         clip.iter().for_each(|clip| chart.draw(gpu, pass, clip));
@@ -354,47 +405,70 @@ impl Renderer {
         Some(eye)
     }
 
-    fn draw_view(&self, pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget, eye: &Point3<f64>) {
+    fn draw_view(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        view: &ViewTarget,
+        (eye, sight): (&Point3<f64>, &Magnification),
+    ) {
+        let per_metre = |it: &Bounds| sight.most_pixels_per_metre(&it.center, it.radius);
         pass.set_bind_group(0, &view.group, &[]);
 
         pass.set_pipeline(&self.pipelines.mesh);
         pass.set_vertex_buffer(1, self.instances.slice(..));
-        self.draw_batches(pass, &self.plan.casters);
-        self.draw_batches(pass, &self.plan.marks);
+        self.draw_batches(pass, &self.plan.casters, &per_metre);
+        self.draw_batches(pass, &self.plan.marks, &per_metre);
         pass.set_pipeline(&self.pipelines.floor);
         pass.draw(0..4, 0..1);
         pass.set_pipeline(&self.pipelines.background);
         pass.draw(0..3, 0..1);
-        self.draw_translucent(pass, eye);
+        self.draw_translucent(pass, eye, &per_metre);
         if let Some(ghost) = &self.plan.ghost {
             pass.set_pipeline(&self.pipelines.ghost);
-            self.draw_batches(pass, std::slice::from_ref(ghost));
+            self.draw_batches(pass, std::slice::from_ref(ghost), &per_metre);
         }
     }
 
     /// The farthest first, by their middles: a body within another one is drawn as if beside it.
-    fn draw_translucent(&self, pass: &mut wgpu::RenderPass<'_>, eye: &Point3<f64>) {
+    fn draw_translucent(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        eye: &Point3<f64>,
+        per_metre: &dyn Fn(&Bounds) -> f64,
+    ) {
         if self.plan.translucent.is_empty() {
             return;
         }
-        let away = |middle: &Point3<f64>| (middle - eye).norm_squared();
-        let mut order: Vec<&(Point3<f64>, Batch)> = self.plan.translucent.iter().collect();
-        order.sort_by(|(a, _), (b, _)| away(b).total_cmp(&away(a)));
+        let away = |batch: &Batch| (batch.bounds.center - eye).norm_squared();
+        let mut order: Vec<&Batch> = self.plan.translucent.iter().collect();
+        order.sort_by(|a, b| away(b).total_cmp(&away(a)));
         pass.set_pipeline(&self.pipelines.translucent);
-        for (_, batch) in order {
-            self.draw_batches(pass, std::slice::from_ref(batch));
+        for batch in order {
+            self.draw_batches(pass, std::slice::from_ref(batch), per_metre);
         }
     }
 
-    fn draw_batches(&self, pass: &mut wgpu::RenderPass<'_>, batches: &[Batch]) {
+    /// `per_metre`: pixels, or texels, that a metre within bounds takes at most.
+    fn draw_batches(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        batches: &[Batch],
+        per_metre: &dyn Fn(&Bounds) -> f64,
+    ) {
         for batch in batches.iter().filter(|batch| !batch.instances.is_empty()) {
-            self.meshes[batch.mesh].draw(pass, batch.instances.clone());
+            let error = self.unseen_pixels / (per_metre(&batch.bounds) * batch.scale);
+            let drawn = self.meshes[batch.mesh].draw(pass, batch.instances.clone(), error);
+            self.triangles.fetch_add(drawn, Ordering::Relaxed);
         }
     }
 
     fn bounds(&self, stage: &Stage, body: &StageBody, pose: &Isometry3<f64>) -> Bounds {
         stage.body_bounds(body, pose, &self.mesh_bounds[body.mesh])
     }
+}
+
+fn ordered(mesh: &TriangleMesh) -> Shaded {
+    shade(mesh).in_drawing_order()
 }
 
 /// Instances of one frame, in the order of the buffer.
@@ -404,11 +478,22 @@ struct InstanceList {
 }
 
 impl InstanceList {
-    fn batch(&mut self, mesh: usize, instances: impl IntoIterator<Item = Instance>) -> Batch {
+    fn batch(
+        &mut self,
+        mesh: usize,
+        instances: impl IntoIterator<Item = Instance>,
+        bounds: Bounds,
+        scale: f64,
+    ) -> Batch {
         let first = self.instances.len() as u32;
         self.instances.extend(instances);
         let instances = first..self.instances.len() as u32;
-        Batch { mesh, instances }
+        Batch {
+            mesh,
+            instances,
+            bounds,
+            scale,
+        }
     }
 }
 

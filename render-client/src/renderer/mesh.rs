@@ -5,8 +5,9 @@ use nalgebra::Matrix4;
 use taut_proto::Finish;
 
 use super::pipeline::{FrameLayout, Layer, Output, PipelineParts, filled};
-use crate::normals::shade;
-use crate::stage::{StageBody, TriangleMesh};
+use crate::detail::{Detail, Level, coarsest};
+use crate::normals::Shaded;
+use crate::stage::{Bounds, StageBody};
 
 /// A vertex with its normal: 16 bytes, so that 1.7 million triangles take about 34 MB with their indices.
 #[repr(C)]
@@ -53,16 +54,20 @@ impl Material {
 pub(crate) struct MeshBuffers {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
-    count: u32,
+    levels: Vec<Level>,
 }
 
 /// Consecutive instances of one mesh.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Batch {
     /// Place of the mesh in the renderer's list.
     pub(crate) mesh: usize,
     /// Places of the instances in the renderer's buffer.
     pub(crate) instances: std::ops::Range<u32>,
+    /// Around them all.
+    pub(crate) bounds: Bounds,
+    /// Metres for the mesh's unit.
+    pub(crate) scale: f64,
 }
 
 impl Instance {
@@ -82,8 +87,7 @@ impl Instance {
 }
 
 impl MeshBuffers {
-    pub(crate) fn new(device: &wgpu::Device, mesh: &TriangleMesh) -> Self {
-        let shaded = shade(mesh).in_drawing_order();
+    pub(crate) fn new(device: &wgpu::Device, shaded: &Shaded) -> Self {
         let vertex = |&(position, normal)| Vertex {
             position,
             normal: folded(normal),
@@ -92,21 +96,17 @@ impl MeshBuffers {
         if vertices.is_empty() {
             vertices.push(Vertex::zeroed()); // a buffer has at least one element
         }
-        let indices = if shaded.indices.is_empty() {
-            vec![0]
-        } else {
-            shaded.indices
-        };
-        let count = if mesh.triangles.is_empty() {
-            0
-        } else {
-            indices.len() as u32
-        };
         Self {
             vertices: filled(device, "vertices", &vertices, wgpu::BufferUsages::VERTEX),
-            indices: filled(device, "indices", &indices, wgpu::BufferUsages::INDEX),
-            count,
+            indices: index_buffer(device, &shaded.indices),
+            levels: vec![Level::whole(shaded)],
         }
+    }
+
+    /// Takes the levels of the same mesh.
+    pub(crate) fn refine(&mut self, device: &wgpu::Device, detail: Detail) {
+        self.indices = index_buffer(device, &detail.indices);
+        self.levels = detail.levels;
     }
 
     /// Size on the graphics card, in bytes.
@@ -114,12 +114,26 @@ impl MeshBuffers {
         self.vertices.size() + self.indices.size()
     }
 
-    /// Draws instances; pipeline, bind group and instance buffer (slot 1) are set.
-    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, instances: std::ops::Range<u32>) {
+    /// Draws instances with the fewest triangles that are off by at most `error`, in the mesh's unit; pipeline, bind group and instance buffer
+    /// (slot 1) are set. How many triangles that were.
+    pub(crate) fn draw(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        instances: std::ops::Range<u32>,
+        error: f64,
+    ) -> u64 {
+        let indices = &self.levels[coarsest(&self.levels, error)].indices;
+        let triangles = indices.len() * instances.len() / 3;
         pass.set_vertex_buffer(0, self.vertices.slice(..));
         pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..self.count, 0, instances);
+        pass.draw_indexed(indices.clone(), 0, instances);
+        triangles as u64
     }
+}
+
+fn index_buffer(device: &wgpu::Device, indices: &[u32]) -> wgpu::Buffer {
+    let at_least_one = if indices.is_empty() { &[0] } else { indices };
+    filled(device, "indices", at_least_one, wgpu::BufferUsages::INDEX)
 }
 
 /// The place of a unit vector on the octahedron |x| + |y| + |z| = 1, folded out to a square, ±32767 at its edges.
