@@ -182,7 +182,7 @@ fn drawn(mesh: &TriangleMesh, scale: f64, whole: bool) -> Option<(u64, Vec<RgbaI
 fn fewer_triangles_show_the_same_picture() {
     let some = ["sphere", "ripples", "scan", "two sizes"];
     for (name, mesh) in meshes().into_iter().filter(|(name, _)| some.contains(name)) {
-        for scale in [1.0, 3.0] {
+        for scale in [1.0, 9.0] {
             let all = mesh.triangles.len() as u64;
             let Some(fewer) = drawn(&mesh, scale, false) else {
                 return;
