@@ -270,15 +270,22 @@ pub struct Magnification {
 }
 
 impl Magnification {
-    /// Of a picture of `screen` that is so many pixels wide.
-    pub fn new(screen: &Screen, eyes: &Eyes, planes: &ClipPlanes, width: u32) -> Self {
+    /// Of a picture of `screen` that is so many pixels wide and high. The way in which they are smaller counts: two eyes side by side may halve the width.
+    pub fn new(
+        screen: &Screen,
+        eyes: &Eyes,
+        planes: &ClipPlanes,
+        (width, height): (u32, u32),
+    ) -> Self {
         let eye = eyes.position(Eye::Middle);
+        let across = f64::from(width) / screen.width;
+        let upward = f64::from(height) / screen.height;
         Self {
             eye,
             aside: (eyes.left - eye).norm(),
             ahead: -screen.normal,
             near: planes.near,
-            pixels: screen.distance(&eye) * f64::from(width) / screen.width,
+            pixels: screen.distance(&eye) * across.max(upward),
         }
     }
 
@@ -343,7 +350,7 @@ mod tests {
         fn nothing_is_larger_in_the_picture_than_the_magnification_says(
             eye in prop::array::uniform3(-0.5..0.5), center in prop::array::uniform3(-0.8..0.8),
             radius in 0.01..0.3, at in prop::array::uniform3(-1.0..1.0), along in prop::array::uniform3(-1.0..1.0),
-            separation in 0.0..0.08,
+            separation in 0.0..0.08, width in 100_u32..4000, height in 100_u32..4000,
         ) {
             let at = Vector3::from(at);
             let along = Vector3::from(along);
@@ -353,8 +360,8 @@ mod tests {
             let head = Isometry3::translation(eye[0], eye[1] - 1.2, 0.6 + eye[2]);
             let eyes = Eyes::of_head(&head, separation);
             let planes = ClipPlanes { near: 0.05, far: 20.0 };
-            let (center, width) = (Point3::from(center), 1920);
-            let sight = Magnification::new(&screen, &eyes, &planes, width);
+            let center = Point3::from(center);
+            let sight = Magnification::new(&screen, &eyes, &planes, (width, height));
             let point = center + at * radius;
             let step = along.normalize() * 1e-6;
             for eye in [eyes.left, eyes.right] {
@@ -363,7 +370,7 @@ mod tests {
                 let clip = screen.clip_from_workbench(&eye, &planes).expect("in front");
                 let pixel = |p: Point3<f64>| {
                     let place = project(&clip, &p).expect("in front").coords;
-                    place.component_mul(&nalgebra::Vector2::new(0.5, 0.5 * 1.2 / 1.8)) * f64::from(width)
+                    0.5 * place.component_mul(&nalgebra::Vector2::new(width.into(), height.into()))
                 };
                 let pixels = (pixel(point + step) - pixel(point - step)).norm() / (2.0 * step.norm());
                 let most = sight.most_pixels_per_metre(&center, radius);

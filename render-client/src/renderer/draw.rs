@@ -350,9 +350,9 @@ impl Renderer {
                 enter(pass, picture, view);
                 match (seen, chart) {
                     (Some(eye), None) => {
-                        let [_, _, width, _] = pixels_of(view, picture.size);
-                        let planes = &self.clip_planes;
-                        let sight = Magnification::new(screen, eyes, planes, width);
+                        let [_, _, width, height] = pixels_of(view, picture.size);
+                        let (planes, size) = (&self.clip_planes, (width, height));
+                        let sight = Magnification::new(screen, eyes, planes, size);
                         self.draw_view(pass, view, (&eye, &sight));
                     }
                     (Some(eye), Some(chart)) => {
