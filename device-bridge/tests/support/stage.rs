@@ -194,13 +194,19 @@ impl Stage {
     /// A tick whose force the device has before the next, or which it has had the time to take: two ticks in one write would be no fault of a
     /// driver. A line that writes nothing for `patience` is lost, and not waited for until it writes again.
     fn written_tick(&mut self, inside: &dyn Inside, patience: Duration) {
+        let rounded = self.rounded;
+        let near = |force: i64, other: i64| (force - other).abs() <= rounded;
+        let had = inside.get("force");
         self.tick();
         let ticked = (self.port.rendered().fixed_rows::<3>(0).norm() * 1e6) as i64;
+        // The first step from zero, and the device had as much before: the port was told of a zero that may be still on its way, and what the device has
+        // is older than that.
+        let is_older = near(had, SLEW) && near(ticked, SLEW);
         let (begun, before) = (Instant::now(), inside.get("writes"));
         loop {
             thread::sleep(ms(1));
             let writes = inside.get("writes");
-            let has_it = (inside.get("force") - ticked).abs() <= self.rounded;
+            let has_it = !is_older && near(inside.get("force"), ticked);
             if has_it || writes >= before + ON_THE_WAY {
                 self.lost_at = None;
                 return;
