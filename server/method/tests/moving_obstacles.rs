@@ -286,30 +286,51 @@ fn a_blade_that_turns_takes_the_body_along() {
     assert_eq!(blocked, 0);
 }
 
-#[test]
-fn a_body_in_a_slot_that_moves_goes_with_it() {
-    // Two jaws in one piece, 0.1 mm from the body on either side; it goes three clearances in each update, and turns.
-    let (half, clearance) = (Vector3::new(0.02, 0.02, 0.01), 1e-4);
-    let jaw = Vector3::new(0.005, 0.05, 0.05);
-    let middle = half.x + clearance + jaw.x;
-    let one = box_obstacle("slot", jaw, Vector3::zeros());
+const CLEARANCE: f64 = 1e-4;
+/// Of a jaw from the middle of the slot, m.
+const JAW: f64 = 0.02 + CLEARANCE + 0.005;
+
+/// Two jaws in one piece, 0.1 mm from the body on either side.
+fn slot() -> Arc<World> {
+    let one = box_obstacle("slot", Vector3::new(0.005, 0.05, 0.05), Vector3::zeros());
     let (corners, faces) = (one.mesh.vertices(), one.mesh.triangles());
-    let vertices = [-middle, middle]
+    let vertices = [-JAW, JAW]
         .into_iter()
         .flat_map(|x| corners.iter().map(move |c| c + Vector3::x() * x));
     let second = faces.iter().map(|t| t.map(|i| i + corners.len() as u32));
     let triangles = faces.iter().copied().chain(second);
     let mesh =
         god_object::Mesh::new(vertices.collect(), triangles.collect()).expect("two closed boxes");
-    let world = Arc::new(World {
-        body: box_body(half),
+    Arc::new(World {
+        body: box_body(Vector3::new(0.02, 0.02, 0.01)),
         obstacles: vec![god_object::Obstacle { mesh, ..one }],
-    });
+    })
+}
+
+/// The same in two pieces.
+fn two_jaws() -> Arc<World> {
+    let jaw = |x: f64| {
+        box_obstacle(
+            "jaw",
+            Vector3::new(0.005, 0.05, 0.05),
+            Vector3::new(x, 0.0, 0.0),
+        )
+    };
+    Arc::new(World {
+        body: box_body(Vector3::new(0.02, 0.02, 0.01)),
+        obstacles: vec![jaw(-JAW), jaw(JAW)],
+    })
+}
+
+#[test]
+fn a_body_in_a_slot_that_moves_goes_with_it() {
+    // It goes three clearances in each update, and turns.
+    let world = slot();
     let settings = Settings::for_size(0.04);
     let mut god_object =
         GodObject::new(world.clone(), settings, Pose::identity()).expect("a free start");
     for update in 1..=100 {
-        let way = 3.0 * clearance * f64::from(update);
+        let way = 3.0 * CLEARANCE * f64::from(update);
         let slot = Pose::new(
             Vector3::new(way, 0.0, 0.0),
             Vector3::new(0.0, 0.0, 5e-3 * f64::from(update)),
@@ -320,8 +341,91 @@ fn a_body_in_a_slot_that_moves_goes_with_it() {
         assert_eq!(report.obstacles_blocked, 0, "in update {update}");
         assert!(!overlaps(&world, &god_object));
         let aside = (slot.inverse() * god_object.pose()).translation.x;
-        assert!(aside.abs() < middle, "left the slot: {aside}");
+        assert!(aside.abs() < JAW, "left the slot: {aside}");
     }
+}
+
+#[test]
+fn in_a_slot_that_moves_with_the_hand_the_body_does_what_it_does_in_one_that_stands_for_no_more_work()
+ {
+    // The whole way in each update: a share of it would be another one where the hand moves.
+    let settings = Settings {
+        k_s: 1.0,
+        ..Settings::for_size(0.04)
+    };
+    let motions = [(3e-5, 0.0), (3e-4, 1e-3), (3e-3, 2e-2)];
+    let worlds = [slot(), two_jaws()];
+    let cases = worlds
+        .iter()
+        .flat_map(|world| motions.map(|by| (world, by)));
+    for (world, (step, turn)) in cases {
+        let start = || GodObject::new(world.clone(), settings, Pose::identity());
+        let mut still = start().expect("a free start");
+        let mut moving = start().expect("a free start");
+        let (mut worst, mut work) = (0.0_f64, [0, 0]);
+        for update in 0..200 {
+            let time = 0.02 * f64::from(update);
+            let hand = Pose::new(
+                Vector3::new((3.1 * time).sin(), (2.3 * time).sin(), (1.7 * time).cos()) * 2e-3,
+                Vector3::new(
+                    0.02 * time.sin(),
+                    0.3 * (0.9 * time).sin(),
+                    0.02 * time.cos(),
+                ),
+            );
+            let way = f64::from(update) * step;
+            let slot = Pose::new(
+                Vector3::new(way, -0.5 * way, 0.3 * way),
+                Vector3::new(0.3, 1.0, -0.5) * (turn * f64::from(update)),
+            );
+            work[0] += still.step(&hand, None).work.nominal_us();
+            for (index, obstacle) in world.obstacles.iter().enumerate() {
+                moving.move_obstacle(index, &(slot * obstacle.pose));
+            }
+            let report = moving.step(&(slot * hand), None);
+            work[1] += report.work.nominal_us();
+            assert_eq!(report.obstacles_blocked, 0, "in update {update}");
+            assert!(!overlaps(world, &moving));
+            let off = slot.inv_mul(moving.pose()).inv_mul(still.pose());
+            worst = worst.max(off.translation.vector.norm() + 0.03 * off.rotation.angle());
+        }
+        println!("{step} m, {turn} rad: {worst:.1e} m, work {work:?}");
+        assert!(worst < 0.1 * settings.rest_distance, "{worst} m");
+        assert!(4 * work[1] < 5 * work[0], "{work:?}");
+    }
+}
+
+#[test]
+fn what_a_slot_takes_its_body_towards_has_a_row_before_the_set_says_that_it_is_complete() {
+    let wall = box_obstacle(
+        "wall",
+        Vector3::new(0.1, 0.01, 0.1),
+        Vector3::new(0.0, 0.08, 0.0),
+    );
+    let mut world = (*slot()).clone();
+    world.obstacles.push(wall);
+    let world = Arc::new(world);
+    let settings = Settings::for_size(0.04);
+    let mut god_object =
+        GodObject::new(world.clone(), settings, Pose::identity()).expect("a free start");
+    let mut rows = 0;
+    for update in 0..170 {
+        let slot = Pose::translation(0.0, 3e-4 * f64::from(update), 0.0);
+        god_object.move_obstacle(0, &slot);
+        let hand = slot * Pose::translation(1e-3, 0.0, 0.0);
+        let _ = god_object.step(&hand, None);
+        let gap = 0.05 - god_object.pose().translation.y;
+        let set = god_object.constraint_set();
+        let of_wall = |row: &&god_object::NonPenetrationConstraint| row.features.obstacle == 1;
+        let known = set.constraints.iter().filter(of_wall).count();
+        rows += known;
+        assert!(
+            known > 0 || set.complete_within <= gap + 1e-9,
+            "update {update}: the wall is {gap} m away, and the set is complete within {}",
+            set.complete_within
+        );
+    }
+    assert!(rows > 0, "it never came near");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use super::obstacles::{Ahead, PlacedObstacle};
 use crate::collision::Work;
 use crate::constraint::{Contact, MAX_ROWS, NonPenetrationConstraint, Surfaces};
 use crate::shape;
-use crate::spatial::pose_difference;
+use crate::spatial::{Pose, pose_difference};
 use crate::surface::ShadingNormals;
 use crate::world::World;
 
@@ -102,6 +102,25 @@ impl GodObject {
             ));
             place.pose = placed.pose;
             if let Some(reduction) = self.reduction.as_mut().filter(|_| place.chosen) {
+                reduction.note_moved(index, path);
+            }
+        }
+    }
+
+    /// The body has made a motion, its fastest point by `path` (m), with some obstacles: what is known of pairs with these goes along.
+    pub(super) fn take_rows_along(&mut self, motion: &Pose, path: f64) {
+        let Some(reduction) = &mut self.reduction else {
+            return;
+        };
+        reduction.go_along(motion);
+        // No copy is alive between two collections.
+        let Some(places) = Arc::get_mut(&mut self.places) else {
+            return;
+        };
+        for (index, (place, placed)) in places.iter_mut().zip(&self.obstacles).enumerate() {
+            if placed.is_with_body() {
+                place.pose = placed.pose;
+            } else if place.chosen {
                 reduction.note_moved(index, path);
             }
         }

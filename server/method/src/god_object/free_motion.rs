@@ -1,15 +1,24 @@
 //! How far a motion is free of every obstacle: continuous collision detection, obstacle by obstacle.
 
+use super::obstacles::PlacedObstacle;
 use super::{GodObject, StepReport};
 use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
 use crate::shape;
 
 impl GodObject {
-    /// The fraction of the motion that is free of every obstacle, in [0, 1].
-    pub(super) fn free_time(&mut self, mut motion: Motion, report: &mut StepReport) -> f64 {
+    /// The fraction of the motion that is free of every obstacle but those that go along, in [0, 1].
+    pub(super) fn free_time(
+        &mut self,
+        mut motion: Motion,
+        goes_along: impl Fn(&PlacedObstacle) -> bool,
+        report: &mut StepReport,
+    ) -> f64 {
         let settings = self.advancement();
         let mut free = 1.0;
         for (obstacle, placed) in self.world.obstacles.iter().zip(&self.obstacles) {
+            if goes_along(placed) {
+                continue;
+            }
             let found = shape::time_of_impact(
                 &self.world.body,
                 &motion,

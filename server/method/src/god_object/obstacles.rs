@@ -10,15 +10,19 @@
 //! *it* is free of the obstacles where they are. Only one side moves at a time, so that what holds for obstacles at rest
 //! holds here: the surfaces stay apart all the way. Where the body is squeezed, the obstacle stops, lags its target, and is
 //! counted as blocked. Beyond the paper, whose obstacles stand still.
+//!
+//! Before that, the body goes along with the obstacle that is nearest, as one rigid body with it, as far as that is free of the others; from there the
+//! hand leads it back. So a body in a part that moves does what it does in one that stands, with the same rows, and is searched for impact no more often.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use super::{GodObject, StepReport};
-use crate::collision::TimeOfImpact;
+use crate::collision::{Motion, TimeOfImpact};
 use crate::constraint::NonPenetrationConstraint;
 use crate::shape::{self, ObstacleWay, Primitive};
 use crate::spatial::{
-    Pose, Vector6, advance_pose, angular, linear, pose_difference, pose_is_finite,
+    Pose, Vector6, advance_pose, angular, at_reference_point, linear, pose_difference,
+    pose_is_finite,
 };
 use crate::world::Obstacle;
 
@@ -31,6 +35,9 @@ const LEAST_PROGRESS: f64 = 0.05;
 /// Smallest such share: below it the body is held.
 const LEAST_SHARE: f64 = 1e-2;
 
+/// Obstacles whose points end up within this of where a rigid motion takes them make it, m: rounding.
+const SAME_MOTION: f64 = 1e-13;
+
 /// Where an obstacle is, and where it is to be.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlacedObstacle {
@@ -39,6 +46,8 @@ pub(super) struct PlacedObstacle {
     /// World from obstacle when the update began.
     before: Pose,
     target: Pose,
+    /// Its motion of this update, as far as it made it, is the body's, too.
+    with_body: bool,
     /// World from obstacle where the body makes room for it next: a share of its way.
     next: Pose,
     /// Radius of the mesh about its origin, m; of a half-space that of what can touch the body.
@@ -51,6 +60,7 @@ impl PlacedObstacle {
             pose: obstacle.pose,
             before: obstacle.pose,
             target: obstacle.pose,
+            with_body: false,
             next: obstacle.pose,
             radius: obstacle.mesh.radius_about(&Point3::origin()),
         }
@@ -64,6 +74,10 @@ impl PlacedObstacle {
         self.pose != self.before
     }
 
+    pub(super) fn is_with_body(&self) -> bool {
+        self.with_body
+    }
+
     /// Rotation since the world was made; exactly none for what never moved.
     pub(super) fn turned_from(&self, obstacle: &Obstacle) -> UnitQuaternion<f64> {
         if self.pose == obstacle.pose {
@@ -71,6 +85,22 @@ impl PlacedObstacle {
         } else {
             self.pose.rotation * obstacle.pose.rotation.inverse()
         }
+    }
+
+    /// Where it is after a share of the way that it has left.
+    fn pose_at(&self, share: f64) -> Pose {
+        if share >= 1.0 {
+            self.target
+        } else {
+            advance_pose(&self.pose, &self.left(), share)
+        }
+    }
+
+    /// Whether it makes the motion that another one makes, as one rigid body with it.
+    fn goes_with(&self, other: &Self) -> bool {
+        let along = other.target * other.pose.inv_mul(&self.pose);
+        let off = pose_difference(&self.target, &along, &Vector3::zeros());
+        self.length(&off) <= SAME_MOTION // false for NaN
     }
 
     /// What is left of its way.
@@ -151,11 +181,12 @@ impl GodObject {
         usable
     }
 
-    /// Moves the obstacles to their targets, and the body out of their way. The longest path asked for, m.
-    pub(super) fn carry_obstacles(&mut self, report: &mut StepReport) -> f64 {
+    /// Moves the obstacles to their targets, and the body out of their way. The longest path asked for, and how far the body went along with one, m.
+    pub(super) fn carry_obstacles(&mut self, report: &mut StepReport) -> (f64, f64) {
         let moved = self.obstacles.iter().any(PlacedObstacle::has_moved);
         for obstacle in &mut self.obstacles {
             obstacle.before = obstacle.pose;
+            obstacle.with_body = false;
         }
         self.bound_half_spaces();
         let asked = self.longest_way_left();
@@ -163,9 +194,10 @@ impl GodObject {
             if moved {
                 self.forget_arrivals();
             }
-            return 0.0;
+            return (0.0, 0.0);
         }
         let tolerance = self.settings.motion_tolerance;
+        let went_along = self.go_along(report);
         let mut share = 1.0;
         for _ in 0..MAX_ALTERNATIONS {
             let gone = self.advance_obstacles(share, report);
@@ -190,7 +222,58 @@ impl GodObject {
         report.obstacles_blocked = u32::try_from(blocked).unwrap_or(u32::MAX);
         let distance = self.settings.activation_distance;
         self.collect(distance, &mut report.work);
-        asked
+        (asked, went_along)
+    }
+
+    /// The body goes along with the obstacle that is nearest of those which may reach it: as one rigid body they need no search between them, and no row
+    /// changes. Where the hand wants it is a motion like any. How far, m.
+    fn go_along(&mut self, report: &mut StepReport) -> f64 {
+        let Some(leader) = self.leader() else {
+            return 0.0;
+        };
+        let displacement = leader.left();
+        // The obstacle's origin goes straight.
+        let straight = leader.pose.translation.vector;
+        let reference_point = self.pose.inverse_transform_point(&straight.into());
+        let motion = Motion {
+            start: at_reference_point(&self.pose, &reference_point),
+            displacement,
+            reference_point,
+        };
+        let before = self.pose_at_reference_point();
+        let goes_along = |placed: &PlacedObstacle| placed.goes_with(&leader);
+        let time = self.free_time(motion, goes_along, report);
+        let there = leader.pose_at(time);
+        self.pose = there * leader.pose.inv_mul(&self.pose);
+        for placed in self.obstacles.iter_mut().filter(|o| o.goes_with(&leader)) {
+            placed.with_body = time >= 1.0;
+            placed.pose = if placed.with_body {
+                placed.target
+            } else {
+                there * leader.pose.inv_mul(&placed.pose)
+            };
+        }
+        let made = pose_difference(&self.pose_at_reference_point(), &before, &Vector3::zeros());
+        let path = self.motion_length(&made);
+        if time >= 1.0 {
+            self.take_rows_along(&(there * leader.pose.inverse()), path);
+        }
+        path
+    }
+
+    /// Of the obstacles that move and have a row within reach of their way, the one with the nearest.
+    fn leader(&self) -> Option<PlacedObstacle> {
+        let moving = self.obstacles.iter().enumerate();
+        let moving = moving.filter(|(_, placed)| placed.is_moving());
+        let within_reach = moving.filter_map(|(index, placed)| {
+            let rows = self.set.constraints.iter();
+            let gaps = rows.filter(|row| usize::from(row.features.obstacle) == index);
+            let nearest = gaps.map(|row| row.gap).fold(f64::INFINITY, f64::min);
+            let reached = nearest <= self.settings.rest_distance + placed.way_left(); // false for NaN
+            reached.then_some((nearest, placed))
+        });
+        let nearest = within_reach.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.map(|(_, placed)| *placed)
     }
 
     /// A half-space has no farthest point: what counts is the part that the body can reach.

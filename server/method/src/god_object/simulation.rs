@@ -179,7 +179,7 @@ impl GodObject {
         let device_moved = self.motion_length(&self.device_step) + self.device_ahead;
 
         // What moves by itself comes first: the body is out of its way before it follows the hand.
-        let obstacles_moved = self.carry_obstacles(&mut report);
+        let (obstacles_moved, went_along) = self.carry_obstacles(&mut report);
         self.begin_carry(&start);
 
         // Where the hand rests, an update that turns back on the last says that the last went too far: sub-steps make the whole way to their goal,
@@ -196,6 +196,7 @@ impl GodObject {
         let mut update = Update {
             all_moved,
             moved: all_moved - self.device_ahead,
+            went_along,
             look_ahead: all_moved,
             made: 0.0,
             step_memory: StepMemory::default(),

@@ -38,6 +38,8 @@ pub(super) struct Update {
     pub(super) all_moved: f64,
     /// Of that, what is known by its pose; not how much farther than that the device may be.
     pub(super) moved: f64,
+    /// How far the body went along with an obstacle, m.
+    pub(super) went_along: f64,
     /// `all_moved`, and what the body may still cover, m: so far the published set must look ahead.
     pub(super) look_ahead: f64,
     /// Way made by the sub-steps so far, m.
@@ -90,7 +92,9 @@ impl GodObject {
         if report.substeps == 1 {
             // This update covers a share of what is free, the next sets must serve the rest.
             let share = self.settings.k_s * self.rest_memory.damping();
-            update.look_ahead = update.all_moved + covered * (1.0 - share) / share;
+            // Back from where an obstacle took the body it goes at once.
+            let shared = (covered - update.went_along).max(0.0);
+            update.look_ahead = update.all_moved + shared * (1.0 - share) / share;
         }
         // Projections are non-expansive: of motions up to the device's own, the last one is no cause.
         let follows = update.made == 0.0 && covered <= update.moved;
@@ -211,7 +215,7 @@ impl GodObject {
         report: &mut StepReport,
     ) -> f64 {
         let motion = self.motion(displacement, &projected.straight);
-        let time = self.free_time(motion, report);
+        let time = self.free_time(motion, |_| false, report);
         self.stopped |= time < 1.0;
         if time > 0.0 {
             let reached = motion.pose_at(time);

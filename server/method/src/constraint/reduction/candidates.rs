@@ -9,7 +9,7 @@
 use nalgebra::{Point3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 
-use super::super::Contact;
+use super::super::{Contact, in_world};
 use super::{Purpose, Surfaces, felt};
 use crate::spatial::{Pose, Vector6, pose_difference};
 
@@ -99,6 +99,20 @@ impl Candidates {
         if moving {
             self.nearer.push(nearer);
         }
+    }
+
+    /// Body and obstacles have made a motion together.
+    pub(super) fn go_along(&mut self, motion: &Pose) {
+        for contact in &mut self.contacts {
+            *contact = in_world(contact, motion);
+        }
+        let [x, y, z, u, v, w] = &mut self.jacobian;
+        for [x, y, z] in [[x, y, z], [u, v, w]] {
+            for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+                [*x, *y, *z] = (motion.rotation * Vector3::new(*x, *y, *z)).into();
+            }
+        }
+        self.collected_at = motion * self.collected_at;
     }
 
     /// Carries the gaps on to another pose of the reference point.
@@ -205,5 +219,66 @@ impl WithSimd for Least<'_> {
         }
         let all = least.iter().chain(rest).copied();
         all.fold(f64::INFINITY, smaller)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::constraint::{Feature, FeaturePair, contact_jacobian};
+
+    #[test]
+    fn what_goes_along_is_what_would_be_found_there() {
+        let reference = Pose::new(Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.2, 0.4, -0.1));
+        let motion = Pose::new(Vector3::new(-0.3, 0.1, 0.7), Vector3::new(1.0, -2.0, 0.5));
+        let row = |contact: &Contact, about: &Pose| {
+            let center = Point3::from(about.translation.vector);
+            contact_jacobian(&contact.normal, &contact.point_on_obstacle, &center)
+        };
+        let there = motion * reference;
+        let (mut gone, mut found) = (Candidates::with_capacity(8), Candidates::with_capacity(8));
+        gone.clear(&reference);
+        found.clear(&there);
+        for k in 0..8_u32 {
+            let u = f64::from(k);
+            let normal = Vector3::new(u.sin(), u.cos(), 0.3 * u - 1.0).normalize();
+            let point_on_obstacle = Point3::new(0.1 * u, 0.05 * (2.0 * u).cos(), 0.2);
+            let contact = Contact {
+                features: FeaturePair {
+                    obstacle: 0,
+                    on_body: Feature::Vertex(k),
+                    on_obstacle: Feature::Face(k),
+                },
+                point_on_body: point_on_obstacle + normal * 1e-3,
+                point_on_obstacle,
+                normal,
+                gap: 1e-3 * (1.0 + u),
+                obstacle_triangle: k,
+                barycentric: [1.0, 0.0, 0.0],
+            };
+            gone.push(&contact, &row(&contact, &reference));
+            let contact = in_world(&contact, &motion);
+            found.push(&contact, &row(&contact, &there));
+        }
+        gone.go_along(&motion);
+        for (a, b) in gone.contacts.iter().zip(&found.contacts) {
+            assert!((a.point_on_obstacle - b.point_on_obstacle).norm() < 1e-12);
+        }
+        // On from there, as the candidates have it.
+        let further = Pose::new(Vector3::new(1e-4, 2e-4, -3e-4), Vector3::zeros()) * there;
+        gone.move_to(&further);
+        found.move_to(&further);
+        for (a, b) in gone.gap.iter().zip(&found.gap) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+        let wish = Vector6::new(1e-3, -2e-3, 3e-3, 0.01, 0.02, -0.03);
+        let least = |all: &mut Candidates| all.least_clearance(&wish, Purpose::Motion, 0.0);
+        let (a, b) = (
+            least(&mut gone).expect("one"),
+            least(&mut found).expect("one"),
+        );
+        assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-12, "{a:?} {b:?}");
     }
 }

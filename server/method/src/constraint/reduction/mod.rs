@@ -41,7 +41,7 @@ use super::overlay::{MAX_PLACES, Overlay};
 use super::{Collected, Contact, FeaturePair, NonPenetrationConstraint, contact_jacobian};
 use crate::collision::{Placement, Work};
 use crate::quasi_statics::{HalfSpace, Projector, SolverKind};
-use crate::spatial::{Vector6, angular, linear};
+use crate::spatial::{Pose, Vector6, angular, linear};
 use crate::world::World;
 use candidates::Candidates;
 use row::{Known, face, felt, jacobian};
@@ -178,6 +178,11 @@ impl RowReduction {
         for &witness in witnesses.iter().take(WITNESSES_TAKEN) {
             self.take_witness((at, surfaces), witness, work);
         }
+    }
+
+    /// The body has made a motion together with the obstacles that the candidates are of.
+    pub(crate) fn go_along(&mut self, motion: &Pose) {
+        self.candidates.go_along(motion);
     }
 
     /// An obstacle has moved, its fastest point by at most `path`, m. Candidates of it are collected anew; of one that has none it is enough to know
