@@ -226,14 +226,14 @@ impl GodObject {
     }
 
     /// The body goes along with the obstacle that is nearest of those which may reach it: as one rigid body they need no search between them, and no row
-    /// changes. Where the hand wants it is a motion like any. How far, m.
+    /// changes. From there the sub-steps lead it to where the hand wants it. How far it went, m.
     fn go_along(&mut self, report: &mut StepReport) -> f64 {
-        let Some(leader) = self.leader() else {
+        let Some(mover) = self.nearest_moving_obstacle() else {
             return 0.0;
         };
-        let displacement = leader.left();
+        let displacement = mover.left();
         // The obstacle's origin goes straight.
-        let straight = leader.pose.translation.vector;
+        let straight = mover.pose.translation.vector;
         let reference_point = self.pose.inverse_transform_point(&straight.into());
         let motion = Motion {
             start: at_reference_point(&self.pose, &reference_point),
@@ -241,28 +241,31 @@ impl GodObject {
             reference_point,
         };
         let before = self.pose_at_reference_point();
-        let goes_along = |placed: &PlacedObstacle| placed.goes_with(&leader);
+        let goes_along = |placed: &PlacedObstacle| placed.goes_with(&mover);
         let time = self.free_time(motion, goes_along, report);
-        let there = leader.pose_at(time);
-        self.pose = there * leader.pose.inv_mul(&self.pose);
-        for placed in self.obstacles.iter_mut().filter(|o| o.goes_with(&leader)) {
+        if time == 0.0 {
+            return 0.0; // rounding is no motion
+        }
+        let there = mover.pose_at(time);
+        self.pose = there * mover.pose.inv_mul(&self.pose);
+        for placed in self.obstacles.iter_mut().filter(|o| o.goes_with(&mover)) {
             placed.with_body = time >= 1.0;
             placed.pose = if placed.with_body {
                 placed.target
             } else {
-                there * leader.pose.inv_mul(&placed.pose)
+                there * mover.pose.inv_mul(&placed.pose)
             };
         }
         let made = pose_difference(&self.pose_at_reference_point(), &before, &Vector3::zeros());
         let path = self.motion_length(&made);
         if time >= 1.0 {
-            self.take_rows_along(&(there * leader.pose.inverse()), path);
+            self.take_rows_along(&(there * mover.pose.inverse()), path);
         }
         path
     }
 
     /// Of the obstacles that move and have a row within reach of their way, the one with the nearest.
-    fn leader(&self) -> Option<PlacedObstacle> {
+    fn nearest_moving_obstacle(&self) -> Option<PlacedObstacle> {
         let moving = self.obstacles.iter().enumerate();
         let moving = moving.filter(|(_, placed)| placed.is_moving());
         let within_reach = moving.filter_map(|(index, placed)| {

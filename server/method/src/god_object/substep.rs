@@ -92,7 +92,7 @@ impl GodObject {
         if report.substeps == 1 {
             // This update covers a share of what is free, the next sets must serve the rest.
             let share = self.settings.k_s * self.rest_memory.damping();
-            // Back from where an obstacle took the body it goes at once.
+            // The way back from where an obstacle took the body is made at once, and not by a share.
             let shared = (covered - update.went_along).max(0.0);
             update.look_ahead = update.all_moved + shared * (1.0 - share) / share;
         }
