@@ -13,7 +13,8 @@ use pulp::{Simd, WithSimd};
 
 use super::descent::{Opened, open};
 use super::displacements::Motions;
-use super::facing_volumes::FacingVolumes;
+use super::facing_volumes::{FacingVolumes, Side};
+use super::single::larger;
 use super::turned::TurnedNodes;
 use super::work::Work;
 use crate::geometry::lanes::LANES;
@@ -126,8 +127,9 @@ pub(crate) fn for_nearest_triangle_pairs(
     wanted: impl Fn(u8, u8) -> bool,
     visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) -> f64 {
-    let scale = (1.0 / margin) as f32;
-    let bands_of = |opened: &Opened| opened.map(|beyond| band_of(1.0 + beyond * scale));
+    let order = Nearest {
+        scale: (1.0 / margin) as f32,
+    };
     let stopped_in = volumes.processor.dispatch(ByBand {
         trees,
         volumes,
@@ -135,30 +137,35 @@ pub(crate) fn for_nearest_triangle_pairs(
         turned,
         work,
         wanted,
-        bands_of,
+        order,
         visit,
     });
     stopped_in.map_or(margin, |band| edge(band, margin))
 }
 
-/// A search that visits pairs of triangles in the order of the bands that `bands_of` puts pairs of volumes in that were opened; [`OUT_OF_QUESTION`]
-/// leaves a pair out. The answer is the band in which it ended because `visit` returned false or there was no room.
-struct ByBand<'a, W, B, V> {
+/// In which band each pair of volumes is that was opened; [`OUT_OF_QUESTION`] leaves a pair out. No closure: it is to be compiled with the vectors of the
+/// search that it is part of.
+trait Order {
+    fn bands(&self, opened: &Opened) -> [u32; LANES];
+}
+
+/// A search that visits pairs of triangles in the order of their bands. The answer is the band in which it ended because `visit` returned false or there was no room.
+struct ByBand<'a, W, O, V> {
     trees: (&'a WideTree, &'a WideTree),
     volumes: &'a FacingVolumes,
     bands: &'a mut Bands,
     turned: &'a mut TurnedNodes,
     work: &'a mut Work,
     wanted: W,
-    bands_of: B,
+    order: O,
     visit: V,
 }
 
 /// The whole search with the vectors that the processor has: a call for each pair of volumes would cost as much as what it tells.
-impl<W, B, V> WithSimd for ByBand<'_, W, B, V>
+impl<W, O, V> WithSimd for ByBand<'_, W, O, V>
 where
     W: Fn(u8, u8) -> bool,
-    B: Fn(&Opened) -> [u32; LANES],
+    O: Order,
     V: FnMut(u32, u32, &mut Work) -> bool,
 {
     type Output = Option<usize>;
@@ -172,7 +179,7 @@ where
             turned,
             work,
             wanted,
-            bands_of,
+            order,
             mut visit,
         } = self;
         let (body, obstacle) = trees;
@@ -197,7 +204,7 @@ where
             }
             work.node_pairs += 1;
             let opened = open(trees, volumes, turned, (a, b));
-            let own = bands_of(&opened);
+            let own = order.bands(&opened);
             opened.for_each(|pair, lane| {
                 let own = own[lane] as usize;
                 if own < SIGNED_BANDS {
@@ -212,42 +219,34 @@ where
     }
 }
 
-/// The band of a signed share: what is deepest comes first, what is farthest last.
-#[inline]
+/// The band of a signed share: what is deepest comes first, what is farthest last. Without branches, as [`band_of`].
+#[inline(always)]
 fn signed_band_of(share: f32) -> u32 {
+    const ALL: u32 = BANDS as u32;
     let band = band_of(share.abs());
     if share < 0.0 {
-        BANDS as u32 - 1 - band
+        ALL - 1 - band
     } else {
-        BANDS as u32 + band
+        ALL + band
     }
 }
 
-/// The same by how far motions leave the pairs apart, deepest first: for pairs that some motion of `motions` may bring below `target`, m. Stops
-/// when `visit` returns false, and where there is no room.
+/// The same by how far motions leave the pairs apart, deepest first: for pairs that some motion may bring below `target`, m. The motions are given as
+/// the body and as the obstacle sees them. Stops when `visit` returns false, and where there is no room.
 pub(crate) fn for_deepest_triangle_pairs(
     trees: (&WideTree, &WideTree),
     (volumes, margin): (&FacingVolumes, f64),
-    (motions, target): (&Motions, f32),
+    (motions, target): ([&Motions; 2], f32),
     (bands, turned): (&mut Bands, &mut TurnedNodes),
     work: &mut Work,
     wanted: impl Fn(u8, u8) -> bool,
     visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) {
-    let obstacle = trees.1;
-    let scale = (1.0 / margin) as f32;
-    let margin = margin as f32;
-    let bands_of = |opened: &Opened| {
-        let mut bands = [OUT_OF_QUESTION; LANES];
-        opened.for_each(|(_, b), lane| {
-            let gap = (margin + opened.beyond(lane)).max(0.0);
-            let short = gap + motions.least_along(obstacle, b) - target;
-            let out_of_question = short > 0.0; // false for NaN
-            if !out_of_question {
-                bands[lane] = signed_band_of(short * scale);
-            }
-        });
-        bands
+    let order = Deepest {
+        trees,
+        motions,
+        margin: margin as f32,
+        target,
     };
     volumes.processor.dispatch(ByBand {
         trees,
@@ -256,9 +255,66 @@ pub(crate) fn for_deepest_triangle_pairs(
         turned,
         work,
         wanted,
-        bands_of,
+        order,
         visit,
     });
+}
+
+/// By how far apart they are at least.
+struct Nearest {
+    /// One over the margin, 1/m.
+    scale: f32,
+}
+
+impl Order for Nearest {
+    #[inline(always)]
+    fn bands(&self, opened: &Opened) -> [u32; LANES] {
+        let mut bands = [0; LANES];
+        for k in 0..LANES {
+            bands[k] = band_of(1.0 + opened.beyond(k) * self.scale);
+        }
+        bands
+    }
+}
+
+/// By how far motions leave them apart at least.
+struct Deepest<'a> {
+    trees: (&'a WideTree, &'a WideTree),
+    /// As the body and as the obstacle sees them.
+    motions: [&'a Motions; 2],
+    /// m.
+    margin: f32,
+    target: f32,
+}
+
+impl Order for Deepest<'_> {
+    #[inline(always)]
+    fn bands(&self, opened: &Opened) -> [u32; LANES] {
+        let [of_body, of_obstacle] = self.motions;
+        let (body, obstacle) = ((of_body, self.trees.0), (of_obstacle, self.trees.1));
+        let ((of_eight, eight), (of_one, one)) = match opened.side {
+            Side::Body => (body, obstacle),
+            Side::Obstacle => (obstacle, body),
+        };
+        let lanes = LANES as u32;
+        let of_eight = of_eight.least_along(eight.node(opened.first / lanes));
+        let of_one = of_one.least_along(one.node(opened.other / lanes));
+        let of_one = of_one.0[(opened.other % lanes) as usize];
+        let (margin, scale) = (self.margin, 1.0 / self.margin);
+        let mut bands = [0; LANES];
+        for k in 0..LANES {
+            let gap = larger(margin + opened.beyond(k), 0.0);
+            let short = gap + larger(of_one, of_eight.0[k]) - self.target;
+            let band = signed_band_of(short * scale);
+            let out_of_question = short > 0.0; // false for NaN
+            bands[k] = if out_of_question {
+                OUT_OF_QUESTION
+            } else {
+                band
+            };
+        }
+        bands
+    }
 }
 
 #[cfg(test)]

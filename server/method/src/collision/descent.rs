@@ -110,10 +110,10 @@ where
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Opened {
     /// The first child below the one that was opened.
-    first: Child,
-    other: Child,
+    pub(super) first: Child,
+    pub(super) other: Child,
     /// Whose volume was opened.
-    side: Side,
+    pub(super) side: Side,
     beyond: Beyond,
 }
 
@@ -129,16 +129,6 @@ impl Opened {
     #[inline(always)]
     pub(super) fn beyond(&self, lane: usize) -> f32 {
         self.beyond.by.0[lane]
-    }
-
-    /// A value for each pair, from how much farther than the margin it is.
-    #[inline(always)]
-    pub(super) fn map(&self, value: impl Fn(f32) -> u32) -> [u32; LANES] {
-        let mut values = [0; LANES];
-        for (to, beyond) in values.iter_mut().zip(&self.beyond.by.0) {
-            *to = value(*beyond);
-        }
-        values
     }
 
     /// Hands on the pairs that may come near, facing each other, and their lanes.

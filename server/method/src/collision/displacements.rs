@@ -1,30 +1,33 @@
-//! How far small motions of a body carry it along the normals of an obstacle's volume, at least.
+//! How far small motions of a body carry it along the normals of the volumes of a tree, at least.
 //!
 //! | symbol | name in code | unit | meaning                                                     |
 //! |--------|--------------|------|-------------------------------------------------------------|
 //! | a, w   |              | m, – | displacement of the centre G and rotation vector             |
-//! | y      |              | m    | contact point on the obstacle, in the volume                 |
+//! | y      |              | m    | contact point, in the volume                                 |
 //! | n      |              | –    | normal of a contact there, in the volume's cone              |
 //! | v      |              | m    | `a + w x (y - G)`: a row's `J a` is `n.v`                     |
+//!
+//! The volume is the obstacle's; or the body's, where the motion is turned round, as the normal is: it is the obstacle that comes, and `n.v` is the same,
+//! since the points of a contact lie along n. Both bounds hold, so the greater does. The rim of a hole has normals all over a quarter of a turn: what
+//! slides past its edge is known from the side of the peg.
 //!
 //! With c the centre of the volume's ball and r its radius, `n.v >= n.v_c - |w| r`; and over a cone about m of half-angle theta the least `n.v_c`
 //! is `|v_c| cos(alpha + theta)`, alpha the angle of m and v_c, or `-|v_c|` where that reaches over pi.
 
 use arrayvec::ArrayVec;
 use nalgebra::{Point3, Vector3};
-use pulp::{Arch, Simd, WithSimd};
 
-use super::single::{dot, product, sum};
-use crate::geometry::lanes::LANES;
-use crate::geometry::wide_tree::{Child, WideTree};
-use crate::spatial::{Vector6, angular, linear};
+use super::single::{dot, product, smaller, sum};
+use crate::geometry::lanes::{LANES, Lanes};
+use crate::geometry::wide_tree::{WideNode, WideTree};
+use crate::spatial::{Pose, Vector6, angular, linear, six};
 
 /// Most motions of one search: where a device is and where it goes on to, and as far as it reaches from there along and about each axis.
 pub(crate) const MAX_MOTIONS: usize = 14;
 /// Rounding in single precision of what a motion does, per size of the motion: some tens of half units in the last place.
 const ROUNDING: f32 = 64.0 * f32::EPSILON;
 
-/// One motion in the obstacle's frame, its coordinates from the tree's origin.
+/// One motion in the frame of the tree, its coordinates from the tree's origin.
 #[derive(Clone, Copy, Debug)]
 struct Small {
     /// What the tree's origin does, m.
@@ -34,42 +37,48 @@ struct Small {
     rounding: f32,
 }
 
-/// Motions of a body, linear, as an obstacle sees them.
+/// Motions of a body, linear, as the volumes of a tree see them.
 #[derive(Clone, Debug)]
 pub(crate) struct Motions {
     all: ArrayVec<Small, MAX_MOTIONS>,
     /// Cosine and sine of what cones are widened by.
     turn: [f32; 2],
-    processor: Arch,
-}
-
-/// What the motions do in one volume, with the instructions that the processor has.
-struct LeastAlong<'a> {
-    motions: &'a Motions,
-    tree: &'a WideTree,
-    child: Child,
-}
-
-impl WithSimd for LeastAlong<'_> {
-    type Output = f32;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> f32 {
-        self.motions.least_along_by_loop(self.tree, self.child)
-    }
 }
 
 impl Motions {
-    /// Of the motions, with the first [`MAX_MOTIONS`] of which G and the vectors are in the obstacle's frame; normals may leave the cones by `tilt`, rad.
-    pub(crate) fn new<'a>(
-        motions: impl IntoIterator<Item = &'a Vector6>,
+    /// The first [`MAX_MOTIONS`] of the motions of G, world axes, as the obstacle sees them whose tree is at `pose`; normals may leave the cones by
+    /// `tilt`, rad.
+    pub(crate) fn seen_by_obstacle(
+        motions: &[Vector6],
         center: &Point3<f64>,
-        tree: &WideTree,
+        (tree, pose): (&WideTree, &Pose),
         tilt: f64,
     ) -> Self {
-        let small = |motion: &Vector6| {
-            let spin: Vector3<f64> = angular(motion);
-            let at_origin = linear(motion) + spin.cross(&(tree.origin - center));
+        Self::seen_from(motions.iter().copied(), center, (tree, pose), tilt)
+    }
+
+    /// The same, as the body sees them whose tree is at `pose`.
+    pub(crate) fn seen_by_body(
+        motions: &[Vector6],
+        center: &Point3<f64>,
+        (tree, pose): (&WideTree, &Pose),
+        tilt: f64,
+    ) -> Self {
+        Self::seen_from(motions.iter().map(|m| -m), center, (tree, pose), tilt)
+    }
+
+    fn seen_from(
+        motions: impl Iterator<Item = Vector6>,
+        center: &Point3<f64>,
+        (tree, pose): (&WideTree, &Pose),
+        tilt: f64,
+    ) -> Self {
+        let into = pose.rotation.inverse();
+        let center = pose.inverse_transform_point(center);
+        let small = |motion: Vector6| {
+            let motion = six(&(into * linear(&motion)), &(into * angular(&motion)));
+            let spin: Vector3<f64> = angular(&motion);
+            let at_origin = linear(&motion) + spin.cross(&(tree.origin - center));
             let size = at_origin.norm() + spin.norm() * tree.reach;
             Small {
                 at_origin: at_origin.map(|x| x as f32).into(),
@@ -79,47 +88,39 @@ impl Motions {
             }
         };
         Self {
-            all: motions.into_iter().take(MAX_MOTIONS).map(small).collect(),
+            all: motions.take(MAX_MOTIONS).map(small).collect(),
             turn: [tilt.cos() as f32, tilt.sin() as f32],
-            processor: Arch::new(),
         }
     }
 
-    /// Least that any of the motions carries a point of the body along a normal in the volume, m.
-    #[inline]
-    pub(super) fn least_along(&self, tree: &WideTree, child: Child) -> f32 {
-        self.processor.dispatch(LeastAlong {
-            motions: self,
-            tree,
-            child,
-        })
-    }
-
+    /// Least that any of the motions carries a point of the body along a normal in each volume of a node, m.
+    ///
+    /// One loop over the lanes, without branches: the compiler makes vectors of it, of those that its caller was compiled for.
     #[inline(always)]
-    fn least_along_by_loop(&self, tree: &WideTree, child: Child) -> f32 {
-        let (node, k) = (tree.node(child / LANES as u32), child as usize % LANES);
-        let lane = |v: &[crate::geometry::lanes::Lanes; 3]| [v[0].0[k], v[1].0[k], v[2].0[k]];
-        let (center, axis) = (sum(&node.origin, &lane(&node.center)), lane(&node.axis));
-        let radius = node.radius.0[k];
+    pub(super) fn least_along(&self, node: &WideNode) -> Lanes {
         let [cos, sin] = self.turn;
-        let (cosine, sine) = (
-            node.cosine.0[k].mul_add(cos, -(node.sine.0[k] * sin)),
-            node.sine.0[k].mul_add(cos, node.cosine.0[k] * sin),
-        );
-        let mut least = f32::INFINITY;
+        let mut least = Lanes::splat(f32::INFINITY);
         for motion in &self.all {
-            let v = sum(&motion.at_origin, &product(&motion.spin, &center));
-            let (along, squared) = (dot(&axis, &v), dot(&v, &v));
-            let length = squared.sqrt();
-            let across = (squared - along * along).max(0.0).sqrt();
-            let within = sine >= 0.0 && along > -length * cosine; // false for NaN
-            let in_cone = if within {
-                along.mul_add(cosine, -(across * sine))
-            } else {
-                -length
-            };
-            let this = in_cone - motion.angle * radius - motion.rounding;
-            least = if this < least { this } else { least };
+            // In the middle of the node, and what is added to it at the centre of a child.
+            let middle = sum(&motion.at_origin, &product(&motion.spin, &node.origin));
+            for k in 0..LANES {
+                let lane = |v: &[Lanes; 3]| [v[0].0[k], v[1].0[k], v[2].0[k]];
+                let (center, axis) = (lane(&node.center), lane(&node.axis));
+                let cosine = node.cosine.0[k].mul_add(cos, -(node.sine.0[k] * sin));
+                let sine = node.sine.0[k].mul_add(cos, node.cosine.0[k] * sin);
+                let v = sum(&middle, &product(&motion.spin, &center));
+                let (along, squared) = (dot(&axis, &v), dot(&v, &v));
+                let length = squared.sqrt();
+                let across = (squared - along * along).max(0.0).sqrt();
+                let within = (sine >= 0.0) & (along > -length * cosine); // false for NaN
+                let in_cone = if within {
+                    along.mul_add(cosine, -(across * sine))
+                } else {
+                    -length
+                };
+                let turning = motion.angle * node.radius.0[k];
+                least.0[k] = smaller(in_cone - turning - motion.rounding, least.0[k]);
+            }
         }
         least
     }

@@ -6,12 +6,11 @@
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
-    CollisionWorkspace, FacingVolumes, MAX_MOTIONS, MAX_WITNESSES, Motions, Placement, Work,
+    CollisionWorkspace, FacingVolumes, MAX_WITNESSES, Motions, Placement, Work,
     for_deepest_triangle_pairs, for_facing_triangle_pairs, for_nearest_triangle_pairs,
 };
 use crate::geometry::Mesh;
-use crate::spatial::{Pose, Vector6, angular, linear, six};
-use arrayvec::ArrayVec;
+use crate::spatial::{Pose, Vector6};
 use nalgebra::Point3;
 
 /// The bits of owned features that stand for corners; those of sides follow.
@@ -173,19 +172,15 @@ pub(crate) fn for_violated(
         activation_distance: asked.reach,
         past_reentrant_edges: false,
     };
-    let into = obstacle_pose.rotation.inverse();
-    let in_obstacle = asked
-        .motions
-        .iter()
-        .map(|motion| six(&(into * linear(motion)), &(into * angular(motion))))
-        .collect::<ArrayVec<_, MAX_MOTIONS>>();
-    let center = obstacle_pose.inverse_transform_point(&asked.center);
-    let motions = Motions::new(&in_obstacle, &center, trees.1, LOOK_AHEAD_TILT);
+    let (motions, center) = (asked.motions, &asked.center);
+    let of_body = Motions::seen_by_body(motions, center, (trees.0, body_pose), LOOK_AHEAD_TILT);
+    let of_obstacle =
+        Motions::seen_by_obstacle(motions, center, (trees.1, obstacle_pose), LOOK_AHEAD_TILT);
     let mut looked_at = 0;
     for_deepest_triangle_pairs(
         trees,
         (&volumes, asked.reach),
-        (&motions, asked.target as f32),
+        ([&of_body, &of_obstacle], asked.target as f32),
         (&mut workspace.bands, &mut workspace.turned),
         work,
         can_touch,

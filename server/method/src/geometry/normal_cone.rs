@@ -28,15 +28,18 @@ pub(crate) struct NormalCone {
     pub(crate) angle: f64,
 }
 
-/// The extreme rays of a vertex's normal cone, unit length: none for a saddle or a hollow. `None` when it was not looked at.
+/// The extreme rays of a vertex's normal cone, unit length: none for a saddle or a hollow. `None` when it was not looked at. `outward` are the sums of
+/// the normals at each edge of the ring.
 fn vertex_rays(
     vertices: &[Point3<f64>],
     topology: &Topology,
+    outward: &[Vector3<f64>],
     v: u32,
     rays: &mut Vec<Vector3<f64>>,
 ) -> Option<()> {
     rays.clear();
     let ring = topology.ring(v);
+    let outward = &outward[topology.ring_start[v as usize] as usize..][..ring.len()];
     if ring.len() > MAX_RING {
         return None;
     }
@@ -59,8 +62,10 @@ fn vertex_rays(
                 continue;
             }
             let ray = cross / squared.sqrt();
+            // What all edges lie below may be the solid itself, as behind a flat face or a groove: there the normals at the edge point the other way.
+            let inward = |n: &Vector3<f64>| n.dot(&outward[i]) < -RAY_TOLERANCE;
             for n in [ray, -ray] {
-                if edges.iter().all(|e| n.dot(e) <= RAY_TOLERANCE) {
+                if edges.iter().all(|e| n.dot(e) <= RAY_TOLERANCE) && !inward(&n) {
                     rays.push(n);
                 }
             }
@@ -89,6 +94,7 @@ pub(crate) fn triangle_cones(
             standing[v as usize] = standing[v as usize].saturating_add(u8::from(counts));
         }
     }
+    let outward = outward_of_rings(face_normals, topology);
     let mut rays = Vec::new();
     let mut cones = Vec::with_capacity(triangles.len());
     let rounding = |t: u32| normal_rounding(&triangles[t as usize].map(|v| vertices[v as usize]));
@@ -108,7 +114,7 @@ pub(crate) fn triangle_cones(
             if !owned || usize::from(standing[corner as usize]) < rim {
                 continue;
             }
-            let looked = vertex_rays(vertices, topology, corner, &mut rays);
+            let looked = vertex_rays(vertices, topology, &outward, corner, &mut rays);
             if looked.is_some() && rays.is_empty() {
                 topology.owned[t] &= !(1 << k);
             }
@@ -124,6 +130,21 @@ pub(crate) fn triangle_cones(
         cones.push(NormalCone { axis, angle });
     }
     cones
+}
+
+/// The sum of the normals of the faces at each edge of each vertex, in the order of the rings.
+fn outward_of_rings(face_normals: &[Vector3<f64>], topology: &Topology) -> Vec<Vector3<f64>> {
+    let mut next = topology.ring_start.clone();
+    let mut outward = vec![Vector3::zeros(); topology.neighbours.len()];
+    for edge in &topology.edges {
+        let [left, right] = edge.faces.map(|f| face_normals[f as usize]);
+        for v in edge.vertices {
+            let place = &mut next[v as usize];
+            outward[*place as usize] = left + right;
+            *place += 1;
+        }
+    }
+    outward
 }
 
 /// Bound on the rounding of a triangle's normal, rad.

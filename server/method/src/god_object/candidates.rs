@@ -4,25 +4,8 @@ use super::GodObject;
 use crate::collision::Work;
 use crate::constraint::{At, Collected, Contact, RowReduction, collect_bounded};
 
-/// A collection that is given up may be blind where surfaces are to touch: flat faces are cut into long triangles, which lie over each other
-/// in their thousands. While no row holds the body, what is nearer than this many rest distances is looked for with more work, since a
-/// body that lands unforeseen costs still more: it is stopped below the rest distance, where volumes in single precision tell nothing apart.
-const NEAR_REST_DISTANCES: f64 = 4.0;
-/// How much more work that is.
-const LANDING_FACTOR: u64 = 64;
-
 /// Trees look at no less than one in so many of the pairs that they may, however many were looked at along the surfaces.
 const LEAST_SHARE: u64 = 16;
-
-/// What is asked of one obstacle.
-struct Asked {
-    /// m.
-    distance: f64,
-    /// Most pairs of triangles, and of their features, to look at.
-    pairs: u64,
-    /// Nothing holds the body yet.
-    lands: bool,
-}
 
 impl GodObject {
     /// The facing pairs within `distance`, m; every obstacle has its share of the work.
@@ -35,7 +18,6 @@ impl GodObject {
     ) {
         reduction.begin(at, distance);
         self.set.gap_min = f64::INFINITY;
-        let lands = !reduction.holds(at.rest_distance);
         let share = self.share();
         let mut looked_at = 0;
         for index in (0..at.places.len()).filter(|index| at.places[*index].chosen) {
@@ -46,12 +28,8 @@ impl GodObject {
             } else {
                 0
             };
-            let asked = Asked {
-                distance,
-                pairs: share.saturating_sub(walked).max(share / LEAST_SHARE).max(1),
-                lands,
-            };
-            let collected = self.candidates_of(index, reduction, at, &asked, work);
+            let pairs = share.saturating_sub(walked).max(share / LEAST_SHARE).max(1);
+            let collected = self.candidates_of(index, reduction, at, (distance, pairs), work);
             looked_at += collected.looked_at;
             self.looked_at[index] = collected.looked_at;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
@@ -83,13 +61,13 @@ impl GodObject {
         (all.saturating_sub(spent) / others).max(1)
     }
 
-    /// Leaves those of one obstacle in `self.contacts`, nearest first.
+    /// Leaves those of one obstacle within `distance`, m, in `self.contacts`, nearest first, as many as so many pairs of triangles and features tell.
     fn candidates_of(
         &mut self,
         index: usize,
         reduction: &mut RowReduction,
         at: &At,
-        asked: &Asked,
+        (distance, pairs): (f64, u64),
         work: &mut Work,
     ) -> Collected {
         let obstacle = at.obstacle(index);
@@ -107,33 +85,17 @@ impl GodObject {
             )
         };
         contacts.clear();
-        let mut reach = reduction.reach(index, asked.distance);
-        let mut collected = collect_within(reach, asked.pairs, contacts);
+        let mut reach = reduction.reach(index, distance);
+        let mut collected = collect_within(reach, pairs, contacts);
         // That was little: there is work left for the rest.
         let done = collected.looked_at;
-        if reach < asked.distance && collected.complete_within >= reach && done < asked.pairs / 2 {
-            reach = asked.distance;
+        if reach < distance && collected.complete_within >= reach && done < pairs / 2 {
+            reach = distance;
             contacts.clear();
-            collected = collect_within(reach, asked.pairs - done, contacts);
+            collected = collect_within(reach, pairs - done, contacts);
             collected.looked_at += done;
         }
-        reduction.reached(
-            at,
-            index,
-            [reach, asked.distance],
-            collected.complete_within,
-        );
-        let near = asked.distance.min(NEAR_REST_DISTANCES * at.rest_distance);
-        if asked.lands && collected.complete_within < near {
-            // What was found farther away stays.
-            contacts.retain(|contact| contact.gap > near);
-            let farther = contacts.first().map_or(f64::INFINITY, |c| c.gap);
-            let most = LANDING_FACTOR * self.settings.look_ahead_pairs;
-            collected = collect_within(near, most, contacts);
-            collected.gap_min = collected.gap_min.min(farther);
-            let by_gap = |a: &Contact, b: &Contact| a.gap.total_cmp(&b.gap);
-            contacts.sort_unstable_by(|a, b| by_gap(a, b).then(a.features.cmp(&b.features)));
-        }
+        reduction.reached(at, index, [reach, distance], collected.complete_within);
         collected
     }
 }

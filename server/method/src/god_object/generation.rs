@@ -23,6 +23,8 @@ const LONGER_WAY: f64 = 0.5;
 const ROW_TOLERANCE_SHARE: f64 = 1e-3;
 /// Motions of a published set whose answers are searched along: where the device is, and where it goes on to.
 const SEARCHED_MOTIONS: usize = 2;
+/// How much more work a search may take after an update in which an obstacle stopped the body: each update in which it is stopped again costs as much.
+const STOPPED_FACTOR: u64 = 64;
 /// Most rows that are added one by one where friction or a moving obstacle leads.
 const MAX_ADDED: u32 = 24;
 
@@ -78,11 +80,11 @@ impl GodObject {
         }
     }
 
-    /// Adds to the candidates those pairs that one of the answers violates, of obstacles that came here and whose surface conforms to the body's: nearest
-    /// first, a collection there is given up before it has seen what a motion presses against, and the pairs that pressed before are others now.
-    /// Whether there are any. Of obstacles at rest the pairs that matter are carried from update to update.
+    /// Adds to the candidates those pairs that one of the answers violates, of obstacles whose surface conforms to the body's: nearest first, a
+    /// collection there is given up before it has seen what a motion presses against. Whether there are any.
     ///
-    /// No such search for motions of the god-object: a pair that is missing stops them, and becomes a row so.
+    /// No such search for motions of the god-object: a pair that is missing stops them, and becomes a row so. Where one did in this update, more may be
+    /// missing, and the search is to come to its end.
     fn search(
         &mut self,
         reduction: &mut RowReduction,
@@ -99,15 +101,17 @@ impl GodObject {
         };
         let target = at.rest_distance + nearer;
         let reach = (target + path).min(self.wanted.max(target)); // NaN is never reached
-        let beyond = reach > reduction.known_within(self.radius); // false for NaN
+        let known = reduction.served() - reduction.moved(self.radius);
+        let beyond = reach > known; // false for NaN
         if !beyond || !reach.is_finite() {
             return false;
         }
         let surfaces = SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, None);
+        let factor = if self.was_stopped { STOPPED_FACTOR } else { 1 };
+        let pairs = factor * self.settings.look_ahead_pairs * answers.len() as u64;
         let mut any = false;
         for index in 0..at.places.len() {
-            let carried = !self.obstacles[index].has_moved();
-            if carried || !at.places[index].chosen || !reduction.conforms(at, index) {
+            if !at.places[index].chosen || !reduction.conforms(at, index) {
                 continue;
             }
             let asked = Violated {
@@ -115,7 +119,7 @@ impl GodObject {
                 center: at.center(),
                 target: target - at.tolerance,
                 reach,
-                pairs: self.settings.look_ahead_pairs * answers.len() as u64,
+                pairs,
             };
             for_violated(
                 (&at.world.body.mesh, &at.pose),

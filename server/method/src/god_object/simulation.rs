@@ -53,6 +53,8 @@ pub struct GodObject {
     pub(super) device_ahead: f64,
     /// An obstacle has stopped a motion since the rows were last taken to the body's pose: the pair that did is a row.
     pub(super) stopped: bool,
+    /// One has in this update: there may be more pairs that no row stands for.
+    pub(super) was_stopped: bool,
     /// Distance within which the present set has every row, m.
     pub(super) collected_within: f64,
     /// Longest look-ahead that the last ones' cost allows, m.
@@ -120,6 +122,7 @@ impl GodObject {
             wanted: settings.activation_distance,
             device_ahead: 0.0,
             stopped: false,
+            was_stopped: false,
             collected_within: 0.0,
             affordable: settings.activation_distance + settings.look_ahead_limit,
         };
@@ -160,6 +163,7 @@ impl GodObject {
     /// [`Self::move_obstacle`] sent somewhere go there first.
     pub fn step(&mut self, device_pose: &Pose, shaded: Option<&ShadedAcceleration>) -> StepReport {
         let mut report = StepReport::default();
+        self.was_stopped = false;
         if !pose_is_finite(device_pose) {
             report.rejected = true;
             self.describe_set(&mut report);

@@ -217,6 +217,7 @@ impl GodObject {
         let motion = self.motion(displacement, &projected.straight);
         let time = self.free_time(motion, |_| false, report);
         self.stopped |= time < 1.0;
+        self.was_stopped |= time < 1.0;
         if time > 0.0 {
             let reached = motion.pose_at(time);
             self.pose = from_reference_point(&reached, &motion.reference_point);

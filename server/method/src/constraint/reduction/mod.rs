@@ -264,12 +264,6 @@ impl RowReduction {
         (self.candidates.complete_within - self.moved(radius)).max(0.0)
     }
 
-    /// Whether a row known touches.
-    pub(crate) fn holds(&self, rest_distance: f64) -> bool {
-        self.contacts()
-            .any(|c| c.gap <= TOUCHING_REST_DISTANCES * rest_distance)
-    }
-
     /// Smallest gap of the rows that face and of the candidates, m. Infinite when there are none.
     pub(crate) fn gap_min(&mut self, at: &At, work: &mut Work) -> f64 {
         let facing = self.known.iter().filter(|row| !row.implied);
