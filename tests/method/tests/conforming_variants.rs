@@ -34,6 +34,29 @@ fn no_variant_penetrates_and_every_one_has_the_force_of_all_rows() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// Walls that lie along each other at a few micrometres, on which a hand presses from where the body has not been: the nearest pairs are those of one side,
+/// and the force is held by the other. By those alone it was off by 28 to 71 %.
+#[test]
+fn a_hand_that_presses_a_tight_fit_aslant_feels_the_walls_that_are_not_yet_touched() {
+    let mut oracle = Oracle::default();
+    let course = Course {
+        steps: 100,
+        stride: 5,
+    };
+    for (seed, name) in [(2, "v23"), (7, "v4"), (8, "v23"), (10, "v9"), (11, "v18")] {
+        let variants = covering(2_000, seed);
+        let variant = variants.iter().find(|v| v.name == name).expect("a variant");
+        let outcome = run(variant, &course, &mut oracle, || 0.0);
+        let error = outcome.errors.iter().copied().fold(0.0, f64::max);
+        assert!(error <= 0.01, "{error} {variant:?}");
+        assert_eq!(
+            (outcome.penetrations, outcome.failures),
+            (0, 0),
+            "{variant:?}"
+        );
+    }
+}
+
 /// A peg in its hole on an end stop, coarse enough for a test.
 fn peg(name: &str) -> Variant {
     let cut = Tessellation {

@@ -322,3 +322,78 @@ pub(crate) fn in_world(contact: &Contact, pose: &Pose) -> Contact {
         ..*contact
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::constraint::overlay::tests::rough;
+    use crate::constraint::{FeaturePair, contact_jacobian};
+    use crate::spatial::six;
+
+    /// Rough squares that lie on each other, at any place in the world: every pair that some motion brings below the target is found, and few others are
+    /// looked at.
+    #[test]
+    fn what_motions_violate_is_found_without_looking_at_all_that_is_near() {
+        let (mut vertices, mut triangles) = rough(14, 5.5e-4, 3);
+        vertices.iter_mut().for_each(|p| p.z = -p.z);
+        triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        let body = Mesh::new(vertices, triangles).expect("a closed block");
+        let (vertices, triangles) = rough(24, 5e-4, 7);
+        let obstacle = Mesh::new(vertices, triangles).expect("a closed block");
+        let (reach, target) = (1e-4, 1e-6);
+        let (mut expected_in_all, mut looked_at, mut near) = (0, 0, 0);
+        for k in 0..40_u32 {
+            let u = f64::from(k);
+            let world = Pose::new(Vector3::new(u, -u, 0.1 * u), Vector3::y() * (0.2 * u));
+            let slid = Vector3::new(1e-4 * (1.7 * u).sin(), 1e-4 * (2.3 * u).cos(), 6e-6);
+            let body_pose = world * Pose::new(slid, Vector3::z() * (0.3 * u).sin());
+            let placed = [(&body, &body_pose), (&obstacle, &world)];
+            let center = body_pose * Point3::new(1e-3, 2e-3, -3e-3);
+            // Along the surfaces, and a little about axes in them.
+            let motions = [0.0, 1.0].map(|shift| {
+                let v = u + shift;
+                let along = Vector3::new((3.0 * v).sin(), (5.0 * v).cos(), 0.0);
+                let about = Vector3::new((2.0 * v).cos(), (11.0 * v).sin(), 0.0);
+                six(
+                    &(world.rotation * (along * 3e-5)),
+                    &(world.rotation * (about * 3e-3)),
+                )
+            });
+            let workspace = &mut CollisionWorkspace::with_candidates(1 << 14);
+            let mut all = Vec::with_capacity(1 << 13);
+            let work = &mut Work::default();
+            let [(a, at_a), (b, at_b)] = placed;
+            let _ = collect_contacts(a, at_a, b, at_b, 0, reach, workspace, &mut all, work);
+            let is_violated = |contact: &&Contact| {
+                let row = contact_jacobian(&contact.normal, &contact.point_on_obstacle, &center);
+                motions.iter().any(|m| contact.gap + row.dot(m) < target)
+            };
+            let violated = all.iter().filter(is_violated).map(|c| c.features);
+            let expected: BTreeSet<FeaturePair> = violated.collect();
+            near += work.triangle_pairs;
+            let before = work.triangle_pairs;
+            let mut found = BTreeSet::new();
+            let asked = Violated {
+                motions: &motions,
+                center,
+                target,
+                reach,
+                pairs: u64::MAX,
+            };
+            for_violated(placed[0], placed[1], 0, &asked, workspace, work, |c| {
+                found.insert(c.features);
+            });
+            looked_at += work.triangle_pairs - before;
+            let missing: Vec<_> = expected.difference(&found).collect();
+            assert!(missing.is_empty(), "{k}: {missing:?}");
+            expected_in_all += expected.len();
+        }
+        println!("{expected_in_all} violated, {looked_at} of {near} pairs of triangles");
+        assert!(expected_in_all > 1000, "{expected_in_all}");
+        assert!(4 * looked_at < 3 * near, "{looked_at} of {near}");
+    }
+}

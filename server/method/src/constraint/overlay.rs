@@ -376,7 +376,7 @@ fn across(mesh: &Mesh, edge: u32, face: u32) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::collision::{CollisionWorkspace, Placement};
     use crate::constraint::{collect_contacts, in_world};
@@ -387,7 +387,11 @@ mod tests {
     const NEAR: f64 = 2e-5;
 
     /// A rough square of `cells` x `cells` about the z axis, on a point below.
-    fn rough(cells: u32, cell: f64, seed: u64) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+    pub(in crate::constraint) fn rough(
+        cells: u32,
+        cell: f64,
+        seed: u64,
+    ) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
         let mut state = seed;
         let mut height = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005) + 1;

@@ -153,3 +153,75 @@ fn normal_rounding(t: &[Point3<f64>; 3]) -> f64 {
     let doubled = sides[0].cross(&sides[1]).norm();
     NORMAL_ROUNDING * sides[0].norm() * sides[1].norm() / doubled
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cells along a side of the slab.
+    const CELLS: u32 = 12;
+
+    /// The widest cone, rad, of the triangles away from the rim of the upper side of a slab that is as high as `height` says.
+    fn widest(height: impl Fn(f64, f64) -> f64) -> f64 {
+        let at = |i: u32, j: u32| i * (CELLS + 1) + j;
+        let share = |i: u32| f64::from(i) / f64::from(CELLS) - 0.5;
+        let places = (0..=CELLS).flat_map(|i| (0..=CELLS).map(move |j| (share(i), share(j))));
+        let mut vertices: Vec<Point3<f64>> = places
+            .map(|(x, y)| Point3::new(x, y, height(x, y)))
+            .collect();
+        let under = vertices.len() as u32;
+        for k in 0..vertices.len() {
+            vertices.push(vertices[k] - Vector3::z());
+        }
+        let mut triangles = Vec::new();
+        for (i, j) in (0..CELLS).flat_map(|i| (0..CELLS).map(move |j| (i, j))) {
+            let q = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            triangles.extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+        }
+        let upper = triangles.len();
+        for k in 0..upper {
+            let [a, b, c] = triangles[k];
+            triangles.push([under + a, under + c, under + b]);
+        }
+        for k in 0..CELLS {
+            for [a, b] in [
+                [at(k, 0), at(k + 1, 0)],
+                [at(CELLS, k), at(CELLS, k + 1)],
+                [at(k + 1, CELLS), at(k, CELLS)],
+                [at(0, k + 1), at(0, k)],
+            ] {
+                triangles.extend([[b, a, under + a], [b, under + a, under + b]]);
+            }
+        }
+        let normals: Vec<Vector3<f64>> = triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|v| vertices[v as usize]);
+                (b - a).cross(&(c - a)).normalize()
+            })
+            .collect();
+        let mut topology = Topology::build(&vertices, &triangles, &normals).expect("closed");
+        let cones = triangle_cones(&vertices, &triangles, &normals, &mut topology);
+        let is_inside = |t: &[u32; 3]| {
+            t.iter().all(|v| {
+                let p = vertices[*v as usize];
+                p.x.abs() < 0.45 && p.y.abs() < 0.45
+            })
+        };
+        let inside = (0..upper).filter(|t| is_inside(&triangles[*t]));
+        inside.map(|t| cones[t].angle).fold(0.0, f64::max)
+    }
+
+    /// Behind the vertices of a flat face and of a groove lies the solid: no direction into it is a normal of theirs.
+    #[test]
+    fn what_is_nearly_flat_has_narrow_cones_whichever_way_it_is_bent() {
+        let bend = |x: f64| 0.5 * x * x;
+        assert!(widest(|_, _| 0.0) < 1e-6);
+        assert!(widest(|x, _| bend(x)) < 1e-6, "a groove stands out nowhere");
+        assert!(widest(|x, y| bend(x) + bend(y)) < 0.2, "a pit");
+        assert!(widest(|x, y| bend(x) - bend(y)) < 0.2, "a saddle");
+        let ridge = widest(|x, _| -bend(x));
+        assert!((0.05..0.2).contains(&ridge), "{ridge}");
+        assert!(widest(|x, y| -bend(x) - bend(y)) < 0.2, "a cap");
+    }
+}
