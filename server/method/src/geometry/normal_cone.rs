@@ -28,12 +28,18 @@ pub(crate) struct NormalCone {
     pub(crate) angle: f64,
 }
 
-/// The extreme rays of a vertex's normal cone, unit length: none for a saddle or a hollow. `None` when it was not looked at. `outward` are the sums of
-/// the normals at each edge of the ring.
+/// What is outward at an edge of a ring: the sum of the normals of its faces, and bounds on their rounding.
+#[derive(Clone, Copy, Debug)]
+struct Outward {
+    sum: Vector3<f64>,
+    rounding: f64,
+}
+
+/// The extreme rays of a vertex's normal cone, unit length: none for a saddle or a hollow. `None` when it was not looked at. `outward` is of all rings.
 fn vertex_rays(
     vertices: &[Point3<f64>],
     topology: &Topology,
-    outward: &[Vector3<f64>],
+    outward: &[Outward],
     v: u32,
     rays: &mut Vec<Vector3<f64>>,
 ) -> Option<()> {
@@ -62,8 +68,10 @@ fn vertex_rays(
                 continue;
             }
             let ray = cross / squared.sqrt();
-            // What all edges lie below may be the solid itself, as behind a flat face or a groove: there the normals at the edge point the other way.
-            let inward = |n: &Vector3<f64>| n.dot(&outward[i]) < -RAY_TOLERANCE;
+            // What all edges lie below may be the solid itself, as behind a flat face or a groove. The faces at an edge that the ray is across lie below
+            // it, too: the sum of their normals says on which side the solid is, unless it is as thin as rounding.
+            let Outward { sum, rounding } = outward[i];
+            let inward = |n: &Vector3<f64>| n.dot(&sum) < -(RAY_TOLERANCE + rounding);
             for n in [ray, -ray] {
                 if edges.iter().all(|e| n.dot(e) <= RAY_TOLERANCE) && !inward(&n) {
                     rays.push(n);
@@ -94,10 +102,10 @@ pub(crate) fn triangle_cones(
             standing[v as usize] = standing[v as usize].saturating_add(u8::from(counts));
         }
     }
-    let outward = outward_of_rings(face_normals, topology);
+    let rounding = |t: u32| normal_rounding(&triangles[t as usize].map(|v| vertices[v as usize]));
+    let outward = outward_of_rings(face_normals, rounding, topology);
     let mut rays = Vec::new();
     let mut cones = Vec::with_capacity(triangles.len());
-    let rounding = |t: u32| normal_rounding(&triangles[t as usize].map(|v| vertices[v as usize]));
     for (t, corners) in triangles.iter().enumerate() {
         let axis = face_normals[t];
         let mut least: f64 = 1.0;
@@ -132,15 +140,27 @@ pub(crate) fn triangle_cones(
     cones
 }
 
-/// The sum of the normals of the faces at each edge of each vertex, in the order of the rings.
-fn outward_of_rings(face_normals: &[Vector3<f64>], topology: &Topology) -> Vec<Vector3<f64>> {
+/// What is outward at each edge of each vertex, in the order of the rings.
+fn outward_of_rings(
+    face_normals: &[Vector3<f64>],
+    rounding: impl Fn(u32) -> f64,
+    topology: &Topology,
+) -> Vec<Outward> {
+    let nothing = Outward {
+        sum: Vector3::zeros(),
+        rounding: 0.0,
+    };
     let mut next = topology.ring_start.clone();
-    let mut outward = vec![Vector3::zeros(); topology.neighbours.len()];
+    let mut outward = vec![nothing; topology.neighbours.len()];
     for edge in &topology.edges {
-        let [left, right] = edge.faces.map(|f| face_normals[f as usize]);
+        let [left, right] = edge.faces;
+        let at_edge = Outward {
+            sum: face_normals[left as usize] + face_normals[right as usize],
+            rounding: rounding(left) + rounding(right),
+        };
         for v in edge.vertices {
             let place = &mut next[v as usize];
-            outward[*place as usize] = left + right;
+            outward[*place as usize] = at_edge;
             *place += 1;
         }
     }
