@@ -270,8 +270,8 @@ impl Order for Nearest {
     #[inline(always)]
     fn bands(&self, opened: &Opened) -> [u32; LANES] {
         let mut bands = [0; LANES];
-        for k in 0..LANES {
-            bands[k] = band_of(1.0 + opened.beyond(k) * self.scale);
+        for (k, band) in bands.iter_mut().enumerate() {
+            *band = band_of(1.0 + opened.beyond(k) * self.scale);
         }
         bands
     }
@@ -302,15 +302,15 @@ impl Order for Deepest<'_> {
         let of_one = of_one.0[(opened.other % lanes) as usize];
         let (margin, scale) = (self.margin, 1.0 / self.margin);
         let mut bands = [0; LANES];
-        for k in 0..LANES {
+        for (k, band) in bands.iter_mut().enumerate() {
             let gap = larger(margin + opened.beyond(k), 0.0);
             let short = gap + larger(of_one, of_eight.0[k]) - self.target;
-            let band = signed_band_of(short * scale);
+            let signed = signed_band_of(short * scale);
             let out_of_question = short > 0.0; // false for NaN
-            bands[k] = if out_of_question {
+            *band = if out_of_question {
                 OUT_OF_QUESTION
             } else {
-                band
+                signed
             };
         }
         bands
