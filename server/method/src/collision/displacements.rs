@@ -17,10 +17,11 @@
 use arrayvec::ArrayVec;
 use nalgebra::{Point3, Vector3};
 
+use super::facing_volumes::Side;
 use super::single::{dot, product, smaller, sum};
 use crate::geometry::lanes::{LANES, Lanes};
 use crate::geometry::wide_tree::{WideNode, WideTree};
-use crate::spatial::{Pose, Vector6, angular, linear, six};
+use crate::spatial::{Pose, Vector6, angular, linear};
 
 /// Most motions of one search: where a device is and where it goes on to, and as far as it reaches from there along and about each axis.
 pub(crate) const MAX_MOTIONS: usize = 14;
@@ -46,39 +47,23 @@ pub(crate) struct Motions {
 }
 
 impl Motions {
-    /// The first [`MAX_MOTIONS`] of the motions of G, world axes, as the obstacle sees them whose tree is at `pose`; normals may leave the cones by
-    /// `tilt`, rad.
-    pub(crate) fn seen_by_obstacle(
+    /// The first [`MAX_MOTIONS`] of the motions of G, world axes, as that side sees them whose tree is at `pose`; normals may leave the cones by `tilt`, rad.
+    pub(crate) fn seen_by(
+        side: Side,
+        (tree, pose): (&WideTree, &Pose),
         motions: &[Vector6],
         center: &Point3<f64>,
-        (tree, pose): (&WideTree, &Pose),
         tilt: f64,
     ) -> Self {
-        Self::seen_from(motions.iter().copied(), center, (tree, pose), tilt)
-    }
-
-    /// The same, as the body sees them whose tree is at `pose`.
-    pub(crate) fn seen_by_body(
-        motions: &[Vector6],
-        center: &Point3<f64>,
-        (tree, pose): (&WideTree, &Pose),
-        tilt: f64,
-    ) -> Self {
-        Self::seen_from(motions.iter().map(|m| -m), center, (tree, pose), tilt)
-    }
-
-    fn seen_from(
-        motions: impl Iterator<Item = Vector6>,
-        center: &Point3<f64>,
-        (tree, pose): (&WideTree, &Pose),
-        tilt: f64,
-    ) -> Self {
+        let sign = match side {
+            Side::Body => -1.0,
+            Side::Obstacle => 1.0,
+        };
         let into = pose.rotation.inverse();
         let center = pose.inverse_transform_point(center);
-        let small = |motion: Vector6| {
-            let motion = six(&(into * linear(&motion)), &(into * angular(&motion)));
-            let spin: Vector3<f64> = angular(&motion);
-            let at_origin = linear(&motion) + spin.cross(&(tree.origin - center));
+        let small = |motion: &Vector6| {
+            let spin: Vector3<f64> = into * angular(motion) * sign;
+            let at_origin = into * linear(motion) * sign + spin.cross(&(tree.origin - center));
             let size = at_origin.norm() + spin.norm() * tree.reach;
             Small {
                 at_origin: at_origin.map(|x| x as f32).into(),
@@ -88,7 +73,7 @@ impl Motions {
             }
         };
         Self {
-            all: motions.take(MAX_MOTIONS).map(small).collect(),
+            all: motions.iter().take(MAX_MOTIONS).map(small).collect(),
             turn: [tilt.cos() as f32, tilt.sin() as f32],
         }
     }

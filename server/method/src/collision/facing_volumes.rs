@@ -56,7 +56,7 @@ const CONE_WIDENING: f64 = 1e-6;
 
 /// Whose volumes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Side {
+pub(crate) enum Side {
     /// Those of the body.
     Body = 0,
     /// Those of the obstacle.

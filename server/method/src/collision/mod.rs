@@ -37,6 +37,6 @@ pub(crate) use advancement::time_to_fall;
 pub(crate) use bands::{for_deepest_triangle_pairs, for_nearest_triangle_pairs};
 pub(crate) use descent::for_facing_triangle_pairs;
 pub(crate) use displacements::{MAX_MOTIONS, Motions};
-pub(crate) use facing_volumes::FacingVolumes;
+pub(crate) use facing_volumes::{FacingVolumes, Side};
 pub(crate) use motion::{Placement, RelativeMotion};
 pub(crate) use workspace::{MAX_CANDIDATES, MAX_WITNESSES};

@@ -6,7 +6,7 @@
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
-    CollisionWorkspace, FacingVolumes, MAX_WITNESSES, Motions, Placement, Work,
+    CollisionWorkspace, FacingVolumes, MAX_WITNESSES, Motions, Placement, Side, Work,
     for_deepest_triangle_pairs, for_facing_triangle_pairs, for_nearest_triangle_pairs,
 };
 use crate::geometry::Mesh;
@@ -172,10 +172,11 @@ pub(crate) fn for_violated(
         activation_distance: asked.reach,
         past_reentrant_edges: false,
     };
-    let (motions, center) = (asked.motions, &asked.center);
-    let of_body = Motions::seen_by_body(motions, center, (trees.0, body_pose), LOOK_AHEAD_TILT);
-    let of_obstacle =
-        Motions::seen_by_obstacle(motions, center, (trees.1, obstacle_pose), LOOK_AHEAD_TILT);
+    let seen_by = |side, placed| {
+        Motions::seen_by(side, placed, asked.motions, &asked.center, LOOK_AHEAD_TILT)
+    };
+    let of_body = seen_by(Side::Body, (trees.0, body_pose));
+    let of_obstacle = seen_by(Side::Obstacle, (trees.1, obstacle_pose));
     let mut looked_at = 0;
     for_deepest_triangle_pairs(
         trees,

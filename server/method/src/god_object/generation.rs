@@ -85,7 +85,7 @@ impl GodObject {
     /// collection there is given up before it has seen what a motion presses against. Whether there are any.
     ///
     /// No such search for motions of the god-object: a pair that is missing stops them, and becomes a row so. Where one did in this update, more may be
-    /// missing, and the search is to come to its end.
+    /// missing, and the search may take more work.
     fn search(
         &mut self,
         reduction: &mut RowReduction,
