@@ -17,7 +17,7 @@ use super::facing_volumes::{FacingVolumes, Side};
 use super::single::larger;
 use super::turned::TurnedNodes;
 use super::work::Work;
-use crate::geometry::lanes::LANES;
+use crate::geometry::lanes::{LANES, Lanes};
 use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
 
 /// Number of bands, K. The first is a two-thousandth of the margin wide. More of them would leave the trees' nodes in an order that the cache
@@ -25,6 +25,8 @@ use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
 const BANDS: usize = 12;
 /// Pairs that wait at a time. One that finds no room ends the search there.
 const CAPACITY: usize = 1 << 15;
+/// Nodes of each tree whose motions are kept.
+const KEPT: usize = 32;
 /// Share of a band's edge that single precision may have got wrong.
 const EDGE_ROUNDING: f64 = 1e-5;
 /// Marks the end of a list.
@@ -146,7 +148,7 @@ pub(crate) fn for_nearest_triangle_pairs(
 /// In which band each pair of volumes is that was opened; [`OUT_OF_QUESTION`] leaves a pair out. No closure: it is to be compiled with the vectors of the
 /// search that it is part of.
 trait Order {
-    fn bands(&self, opened: &Opened) -> [u32; LANES];
+    fn bands(&mut self, opened: &Opened) -> [u32; LANES];
 }
 
 /// A search that visits pairs of triangles in the order of their bands. The answer is the band in which it ended because `visit` returned false or there was no room.
@@ -179,7 +181,7 @@ where
             turned,
             work,
             wanted,
-            order,
+            mut order,
             mut visit,
         } = self;
         let (body, obstacle) = trees;
@@ -243,8 +245,8 @@ pub(crate) fn for_deepest_triangle_pairs(
     visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) {
     let order = Deepest {
-        trees,
-        motions,
+        body: Along::of(motions[0], trees.0),
+        obstacle: Along::of(motions[1], trees.1),
         margin: margin as f32,
         target,
     };
@@ -268,7 +270,7 @@ struct Nearest {
 
 impl Order for Nearest {
     #[inline(always)]
-    fn bands(&self, opened: &Opened) -> [u32; LANES] {
+    fn bands(&mut self, opened: &Opened) -> [u32; LANES] {
         let mut bands = [0; LANES];
         for (k, band) in bands.iter_mut().enumerate() {
             *band = band_of(1.0 + opened.beyond(k) * self.scale);
@@ -279,27 +281,53 @@ impl Order for Nearest {
 
 /// By how far motions leave them apart at least.
 struct Deepest<'a> {
-    trees: (&'a WideTree, &'a WideTree),
-    /// As the body and as the obstacle sees them.
-    motions: [&'a Motions; 2],
+    body: Along<'a>,
+    obstacle: Along<'a>,
     /// m.
     margin: f32,
     target: f32,
 }
 
+/// What motions do along the normals of one tree's volumes, as that tree sees them. A node is met again and again: the last ones are kept.
+struct Along<'a> {
+    motions: &'a Motions,
+    tree: &'a WideTree,
+    nodes: [u32; KEPT],
+    least: [Lanes; KEPT],
+}
+
+impl<'a> Along<'a> {
+    fn of(motions: &'a Motions, tree: &'a WideTree) -> Self {
+        Self {
+            motions,
+            tree,
+            nodes: [NONE; KEPT],
+            least: [Lanes::splat(0.0); KEPT],
+        }
+    }
+
+    /// The least for each volume of the node that holds `child`, m.
+    #[inline(always)]
+    fn least(&mut self, child: Child) -> &Lanes {
+        let node = child / LANES as u32;
+        let place = node as usize % KEPT;
+        if self.nodes[place] != node {
+            self.nodes[place] = node;
+            self.least[place] = self.motions.least_along(self.tree.node(node));
+        }
+        &self.least[place]
+    }
+}
+
 impl Order for Deepest<'_> {
     #[inline(always)]
-    fn bands(&self, opened: &Opened) -> [u32; LANES] {
-        let [of_body, of_obstacle] = self.motions;
-        let (body, obstacle) = ((of_body, self.trees.0), (of_obstacle, self.trees.1));
-        let ((of_eight, eight), (of_one, one)) = match opened.side {
-            Side::Body => (body, obstacle),
-            Side::Obstacle => (obstacle, body),
+    fn bands(&mut self, opened: &Opened) -> [u32; LANES] {
+        let (eight, one) = match opened.side {
+            Side::Body => (&mut self.body, &mut self.obstacle),
+            Side::Obstacle => (&mut self.obstacle, &mut self.body),
         };
-        let lanes = LANES as u32;
-        let of_eight = of_eight.least_along(eight.node(opened.first / lanes));
-        let of_one = of_one.least_along(one.node(opened.other / lanes));
-        let of_one = of_one.0[(opened.other % lanes) as usize];
+        let of_eight = eight.least(opened.first);
+        let of_one = one.least(opened.other).0[opened.other as usize % LANES];
         let (margin, scale) = (self.margin, 1.0 / self.margin);
         let mut bands = [0; LANES];
         for (k, band) in bands.iter_mut().enumerate() {

@@ -331,9 +331,42 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::constraint::overlay::tests::rough;
     use crate::constraint::{FeaturePair, contact_jacobian};
     use crate::spatial::six;
+
+    const ROUGH: f64 = 1e-6;
+
+    /// A rough square of `cells` x `cells` about the z axis, on a point below.
+    fn rough(cells: u32, cell: f64, seed: u64) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+        let mut state = seed;
+        let mut height = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005) + 1;
+            ROUGH * (state >> 33) as f64 / f64::from(1_u32 << 31)
+        };
+        let at = |i: u32, j: u32| i * (cells + 1) + j;
+        let place = |i: u32| cell * (f64::from(i) - 0.5 * f64::from(cells));
+        let mut vertices: Vec<Point3<f64>> = (0..=cells)
+            .flat_map(|i| (0..=cells).map(move |j| [i, j]))
+            .map(|[i, j]| Point3::new(place(i), place(j), height()))
+            .collect();
+        let mut triangles = Vec::new();
+        for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
+            let q = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            triangles.extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+        }
+        let apex = vertices.len() as u32;
+        vertices.push(Point3::new(0.0, 0.0, -cell * f64::from(cells)));
+        for k in 0..cells {
+            let rim = [
+                [at(k, 0), at(k + 1, 0)],
+                [at(cells, k), at(cells, k + 1)],
+                [at(k + 1, cells), at(k, cells)],
+                [at(0, k + 1), at(0, k)],
+            ];
+            triangles.extend(rim.map(|[a, b]| [b, a, apex]));
+        }
+        (vertices, triangles)
+    }
 
     /// Rough squares that lie on each other, at any place in the world: every pair that some motion brings below the target is found, and few others are
     /// looked at.

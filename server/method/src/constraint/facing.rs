@@ -72,31 +72,17 @@ impl Facing<'_> {
             return None;
         }
         let v = self.body.triangles()[pair.a as usize][k];
-        self.vertex_over(v, &pair.x[k], pair.b, gap, || {
-            barycentric(&(pair.x[k] - normal * gap), &pair.y, &normal)
-        })
-    }
-
-    /// Vertex `v` of the body at `x`, which is over the obstacle's face by `gap`; `weights` are those of its foot.
-    pub(super) fn vertex_over(
-        &self,
-        v: u32,
-        x: &Point3<f64>,
-        face: u32,
-        gap: f64,
-        weights: impl FnOnce() -> [f64; 3],
-    ) -> Option<Contact> {
-        let normal = *self.obstacle.face_normal(face);
         let outward = -self.placement.rotation.tr_mul(&normal);
-        let faces = self.is_near(gap) && is_in_vertex_cone(self.body, v, &outward, LOOK_AHEAD_TILT);
+        let faces = is_in_vertex_cone(self.body, v, &outward, LOOK_AHEAD_TILT);
         faces.then(|| {
+            let foot = pair.x[k] - normal * gap;
             self.contact(
                 Feature::Vertex(v),
-                Feature::Face(face),
-                [*x, x - normal * gap],
+                Feature::Face(pair.b),
+                [pair.x[k], foot],
                 normal,
                 gap,
-                (face, weights()),
+                (pair.b, barycentric(&foot, &pair.y, &normal)),
             )
         })
     }

@@ -5,7 +5,6 @@ mod collect;
 mod contact;
 mod facing;
 mod feature;
-mod overlay;
 mod reduction;
 mod reentrant;
 mod separation;

@@ -4,9 +4,6 @@ use super::GodObject;
 use crate::collision::Work;
 use crate::constraint::{At, Collected, Contact, RowReduction, collect_bounded};
 
-/// Trees look at no less than one in so many of the pairs that they may, however many were looked at along the surfaces.
-const LEAST_SHARE: u64 = 16;
-
 impl GodObject {
     /// The facing pairs within `distance`, m; every obstacle has its share of the work.
     pub(super) fn collect_candidates(
@@ -21,23 +18,11 @@ impl GodObject {
         let share = self.share();
         let mut looked_at = 0;
         for index in (0..at.places.len()).filter(|index| at.places[*index].chosen) {
-            // Where trees have failed, what touches is found along the surfaces, and they are to find what is new.
-            let conforms = reduction.conforms(at, index);
-            let walked = if conforms {
-                reduction.offer_along(at, index, work)
-            } else {
-                0
-            };
-            let pairs = share.saturating_sub(walked).max(share / LEAST_SHARE).max(1);
-            let collected = self.candidates_of(index, reduction, at, (distance, pairs), work);
+            let collected = self.candidates_of(index, reduction, at, (distance, share), work);
             looked_at += collected.looked_at;
             self.looked_at[index] = collected.looked_at;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
-            let along = reduction.conforms(at, index);
-            reduction.offer(at, &self.contacts, &collected, along);
-            if !conforms && along {
-                reduction.offer_along(at, index, work);
-            }
+            reduction.offer(at, index, &self.contacts, &collected);
         }
         let looked_at = looked_at + self.given.looked_at;
         self.afford_look_ahead(distance, looked_at + u64::from(reduction.was_given_up()));

@@ -23,9 +23,10 @@ const LONGER_WAY: f64 = 0.5;
 const ROW_TOLERANCE_SHARE: f64 = 1e-3;
 /// Motions of a published set whose answers are searched along: where the device is, and where it goes on to.
 const SEARCHED_MOTIONS: usize = 2;
-/// How much more work a search may take where an obstacle stopped the body in this update, which says that pairs are missing. Of 310 variants of conforming
+/// How much more work a search for the force may take where an obstacle stopped the body in this update, which says that pairs are missing; and how much
+/// less a search for a motion, which needs no more than what it violates deepest: an obstacle stops it otherwise. Of 310 variants of conforming
 /// parts (`conforming_variants --quick`, seeds 1 to 12) the force is off by at most 71, 71, 6 and 6 % with 4, 8, 16 and 64 times as much.
-const STOPPED_FACTOR: u64 = 16;
+const SEARCH_FACTOR: u64 = 16;
 /// Most rows that are added one by one where friction or a moving obstacle leads.
 const MAX_ADDED: u32 = 24;
 
@@ -52,12 +53,8 @@ impl GodObject {
         };
         if let Some(at) = self.place() {
             let stopped = std::mem::take(&mut self.stopped);
-            let witnesses = if stopped {
-                &self.collision.witnesses[..]
-            } else {
-                &[]
-            };
-            reduction.move_to((&at, &self.surfaces(None)), witnesses, work);
+            let witness = self.collision.witnesses.first().filter(|_| stopped);
+            reduction.move_to((&at, &self.surfaces(None)), witness.copied(), work);
             let (moved, within) = (reduction.moved(self.radius), reduction.served());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;
@@ -83,9 +80,6 @@ impl GodObject {
 
     /// Adds to the candidates those pairs that one of the answers violates, of obstacles whose surface conforms to the body's: nearest first, a
     /// collection there is given up before it has seen what a motion presses against. Whether there are any.
-    ///
-    /// No such search for motions of the god-object: a pair that is missing stops them, and becomes a row so. Where one did in this update, more may be
-    /// missing, and the search may take more work.
     fn search(
         &mut self,
         reduction: &mut RowReduction,
@@ -102,14 +96,17 @@ impl GodObject {
         };
         let target = at.rest_distance + nearer;
         let reach = (target + path).min(self.wanted.max(target)); // NaN is never reached
-        let known = reduction.served() - reduction.moved(self.radius);
-        let beyond = reach > known; // false for NaN
+        let beyond = reach > reduction.known_within(self.radius); // false for NaN
         if !beyond || !reach.is_finite() {
             return false;
         }
         let surfaces = SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, None);
-        let factor = if self.was_stopped { STOPPED_FACTOR } else { 1 };
-        let pairs = factor * self.settings.look_ahead_pairs * answers.len() as u64;
+        let pairs = self.settings.look_ahead_pairs * answers.len() as u64;
+        let pairs = match (purpose.is_felt(), self.was_stopped) {
+            (false, _) => pairs / SEARCH_FACTOR,
+            (true, false) => pairs,
+            (true, true) => pairs * SEARCH_FACTOR,
+        };
         let mut any = false;
         for index in 0..at.places.len() {
             if !at.places[index].chosen || !reduction.conforms(at, index) {
@@ -225,7 +222,7 @@ impl GodObject {
         if let Some(at) = self.place() {
             let answers = self.answers(&mut reduction, &at, motions, purpose, work);
             let searched = &answers[..answers.len().min(SEARCHED_MOTIONS)];
-            if purpose.is_felt() && self.search(&mut reduction, &at, searched, purpose, work) {
+            if self.search(&mut reduction, &at, searched, purpose, work) {
                 self.answers(&mut reduction, &at, motions, purpose, work);
             }
         }

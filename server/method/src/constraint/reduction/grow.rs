@@ -367,10 +367,10 @@ mod tests {
             gap_min: 0.0,
         };
         reduction.begin(&at, 1.0);
-        reduction.offer(&at, &contacts, &collected, false);
+        reduction.offer(&at, 0, &contacts, &collected);
 
         let here = block_on_block(0.0);
-        reduction.move_to((&here, &Plain), &[], work);
+        reduction.move_to((&here, &Plain), None, work);
         let wish = Vector6::new(0.0, 0.0, -5.0 * GAP, 0.0, 0.0, 0.0);
         let answer = reduction.complete((&here, &Plain), &wish, Purpose::Motion, work);
         let down = -answer.acceleration[2];

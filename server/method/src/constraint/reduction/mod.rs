@@ -15,8 +15,8 @@
 //! While the body moves within an update, the candidates' gaps are carried on by their Jacobians, and one that seems violated is
 //! looked at as it is. Pairs are collected nearest first, as far as a bound of work allows: those farther apart have no row until
 //! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Where that is not even as far as what touches,
-//! as between surfaces that conform, pairs are found along the surfaces ([`overlay`](super::overlay)), and those that the force's answer violates
-//! are searched for by how far it brings them together ([`for_violated`](super::for_violated)). Where a pair that
+//! as between surfaces that conform, the pairs that an answer violates are searched for by how far it brings them together
+//! ([`for_violated`](super::for_violated)). Where a pair that
 //! holds the body is about to slide across a reentrant corner, the row of what it turns into is added, though it does not face yet; where one has slid
 //! off its features, those of what it became.
 //!
@@ -35,17 +35,16 @@ use arrayvec::ArrayVec;
 
 pub(crate) use at::{At, Place, Purpose, Surfaces};
 
-use super::collect::in_world;
-use super::facing::Facing;
-use super::overlay::{MAX_PLACES, Overlay};
 use super::{Collected, Contact, FeaturePair, NonPenetrationConstraint, contact_jacobian};
-use crate::collision::{Placement, Work};
+use crate::collision::Work;
 use crate::quasi_statics::{HalfSpace, Projector, SolverKind};
 use crate::spatial::{Pose, Vector6, angular, linear};
 use crate::world::World;
 use candidates::Candidates;
 use row::{Known, face, felt, jacobian};
 
+/// Candidates that searches may add to those that were collected.
+const SEARCHED: usize = 4096;
 /// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
 pub(crate) const MAX_ROWS: usize = 160;
 /// So many candidates all become rows of a published set.
@@ -54,8 +53,7 @@ const FEW: usize = 64;
 const MAX_ROUNDS: u32 = 24;
 /// Most candidates that turn out to face no more, in one round.
 const MAX_STALE: u32 = 64;
-/// Witnesses that are looked at, and how near a pair there must be to become a row.
-const WITNESSES_TAKEN: usize = 2;
+/// How near a pair of the triangles that stopped the body must be to become a row.
 const WITNESS_REST_DISTANCES: f64 = 4.0;
 /// Most pairs that have slid off their features which are followed, in one motion.
 const MAX_FOLLOWED: usize = 16;
@@ -69,12 +67,6 @@ const TOUCHING_REST_DISTANCES: f64 = 2.0;
 /// A row of a gap up to so many rest distances holds the body, or will soon.
 const NEAR_REST_DISTANCES: f64 = 4.0;
 
-/// Pairs up to so many rest distances apart are looked for along the surfaces: those that touch, and those that are about to where surfaces are
-/// rough. Farther ones changed no force of a peg in its hole.
-const ALONG_REST_DISTANCES: f64 = 1.5;
-/// Most pairs that are found there, for each vertex.
-const ALONG_PER_PLACE: usize = 2;
-
 /// A collection reaches for so many times what the last one was complete within, where that was given up.
 const REACH_GROWTH: f64 = 2.0;
 
@@ -83,7 +75,6 @@ const REACH_GROWTH: f64 = 2.0;
 pub(crate) struct RowReduction {
     projector: Projector,
     candidates: Candidates,
-    overlay: Overlay,
     known: Vec<Known>,
     /// Rows of the pairs that are not chosen from: Jacobian and gap, m.
     given: Vec<(Vector6, f64)>,
@@ -100,7 +91,7 @@ pub(crate) struct RowReduction {
     outdated: bool,
     /// How far the points of each obstacle may have gone since the candidates were collected, m.
     gone: Vec<f64>,
-    /// Distance within which pairs were candidates when they were collected, m: every one that trees find, or those along the surfaces.
+    /// Distance within which motions find their candidates, m: every pair was collected, or those that they violate are searched for.
     served: f64,
 }
 
@@ -110,8 +101,7 @@ impl RowReduction {
         let most = MAX_ROWS + candidates;
         Self {
             projector: Projector::new(SolverKind::ActiveSet, most),
-            candidates: Candidates::with_capacity(candidates + ALONG_PER_PLACE * MAX_PLACES),
-            overlay: Overlay::new(&world.body.mesh),
+            candidates: Candidates::with_capacity(candidates + SEARCHED),
             known: Vec::with_capacity(MAX_ROWS),
             given: Vec::with_capacity(candidates),
             rows: Vec::with_capacity(most),
@@ -143,11 +133,11 @@ impl RowReduction {
 
     /// Takes the rows to a new pose: pairs that face no more are let go, the candidates' gaps are carried on by their Jacobians.
     ///
-    /// `witnesses` are the triangle pairs that stopped the last motion, if any did, and those before: what faces there becomes a row.
+    /// `witness` is the pair of triangles that stopped the last motion, if any did: what faces there becomes a row.
     pub(crate) fn move_to(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
-        witnesses: &[(u32, u32)],
+        witness: Option<(u32, u32)>,
         work: &mut Work,
     ) {
         self.error = 0.0;
@@ -175,7 +165,7 @@ impl RowReduction {
             self.follow((at, surfaces), pair, work);
         }
         self.candidates.move_to(&at.reference);
-        for &witness in witnesses.iter().take(WITNESSES_TAKEN) {
+        if let Some(witness) = witness {
             self.take_witness((at, surfaces), witness, work);
         }
     }
@@ -244,7 +234,7 @@ impl RowReduction {
         self.candidates.complete_within
     }
 
-    /// Distance within which motions of the god-object have their candidates, m. What is missing there stops a motion, and becomes a row so.
+    /// Distance from where they were collected within which motions find their candidates, m: they are known, or searched for.
     pub(crate) fn served(&self) -> f64 {
         self.served
     }
@@ -296,7 +286,6 @@ impl RowReduction {
         self.gone.fill(0.0);
         self.candidates.clear(&at.reference);
         self.served = f64::INFINITY;
-        self.overlay.begin();
     }
 
     /// How far the pairs of an obstacle are to be collected of a distance asked for, m: what the work did not allow last time it will hardly allow now.
@@ -320,13 +309,13 @@ impl RowReduction {
         };
     }
 
-    /// Adds contacts of the present pose to choose from, world frame, complete within a distance (m); those `along` the surfaces are offered, too.
+    /// Adds contacts of one obstacle at the present pose to choose from, world frame, complete within a distance (m).
     pub(crate) fn offer(
         &mut self,
         at: &At,
+        obstacle: usize,
         contacts: &[Contact],
         collected: &Collected,
-        along: bool,
     ) {
         let room = self.candidates.room();
         for contact in contacts.iter().take(room) {
@@ -340,12 +329,12 @@ impl RowReduction {
         let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
         self.truncated |= within < touching.min(self.asked);
         self.candidates.complete_within = self.candidates.complete_within.min(within);
-        let along = if along {
-            ALONG_REST_DISTANCES * at.rest_distance
+        let searched = if self.conforms(at, obstacle) {
+            touching
         } else {
             0.0
         };
-        self.served = self.served.min(within.max(along));
+        self.served = self.served.min(within.max(searched));
     }
 
     /// Adds a contact of the present pose to choose from where one of the motions violates it, world frame; whether it does.
@@ -375,33 +364,10 @@ impl RowReduction {
         true
     }
 
-    /// Whether the trees did not find every pair of an obstacle that a walk along the surfaces would, the last time.
+    /// Whether the last collection of an obstacle was given up before it had every pair that touches: what motions violate is searched for there.
     pub(crate) fn conforms(&self, at: &At, obstacle: usize) -> bool {
-        let along = ALONG_REST_DISTANCES * at.rest_distance;
-        self.next_reach[obstacle] < REACH_GROWTH * along
-    }
-
-    /// Adds contacts of the present pose that are found along the surfaces; how many vertices were looked at.
-    pub(crate) fn offer_along(&mut self, at: &At, index: usize, work: &mut Work) -> u64 {
-        let (mesh, pose) = at.obstacle(index);
-        let facing = Facing {
-            body: &at.world.body.mesh,
-            obstacle: mesh,
-            placement: &Placement::of(&at.pose, pose),
-            obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
-            activation_distance: ALONG_REST_DISTANCES * at.rest_distance,
-            past_reentrant_edges: false,
-        };
-        let (candidates, known) = (&mut self.candidates, &self.known);
-        let near = known.iter().map(|row| &row.contact);
-        self.overlay
-            .begin_at(&facing, near.chain(&candidates.contacts));
-        self.overlay.walk(&facing, work, |contact| {
-            if candidates.room() > 0 {
-                let contact = in_world(&contact, pose);
-                candidates.push(&contact, &jacobian(&contact, &at.center()));
-            }
-        })
+        let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
+        self.next_reach[obstacle] < REACH_GROWTH * touching
     }
 
     fn knows(&self, features: &FeaturePair) -> bool {
