@@ -4,13 +4,12 @@ use std::sync::Arc;
 
 use arrayvec::ArrayVec;
 
-use super::collection::SceneSurfaces;
 use super::obstacles::Ahead;
 use super::projection::Projected;
 use super::substep::Update;
 use super::{GodObject, StepReport};
 use crate::collision::{MAX_MOTIONS, Work};
-use crate::constraint::{At, Purpose, RowReduction, Surfaces, Violated, for_violated};
+use crate::constraint::{At, Purpose, RowReduction, Surfaces};
 use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
 use crate::surface::Friction;
@@ -23,10 +22,6 @@ const LONGER_WAY: f64 = 0.5;
 const ROW_TOLERANCE_SHARE: f64 = 1e-3;
 /// Motions of a published set whose answers are searched along: where the device is, and where it goes on to.
 const SEARCHED_MOTIONS: usize = 2;
-/// How much more work a search for the force may take where an obstacle stopped the body in this update, which says that pairs are missing; and how much
-/// less a search for a motion, which needs no more than what it violates deepest: an obstacle stops it otherwise. Of 310 variants of conforming
-/// parts (`conforming_variants --quick`, seeds 1 to 12) the force is off by at most 71, 71, 6 and 6 % with 4, 8, 16 and 64 times as much.
-const SEARCH_FACTOR: u64 = 16;
 /// Most rows that are added one by one where friction or a moving obstacle leads.
 const MAX_ADDED: u32 = 24;
 
@@ -76,62 +71,6 @@ impl GodObject {
             self.collect_again(&mut report.work);
             self.complete_for(&motion, Purpose::Motion, &mut report.work);
         }
-    }
-
-    /// Adds to the candidates those pairs that one of the answers violates, of obstacles whose surface conforms to the body's: nearest first, a
-    /// collection there is given up before it has seen what a motion presses against. Whether there are any.
-    fn search(
-        &mut self,
-        reduction: &mut RowReduction,
-        at: &At,
-        answers: &[Vector6],
-        purpose: Purpose,
-        work: &mut Work,
-    ) -> bool {
-        let paths = answers.iter().map(|answer| self.motion_length(answer));
-        let path = paths.fold(0.0, f64::max);
-        let nearer = match purpose {
-            Purpose::ForceThen => self.longest_way(),
-            _ => 0.0,
-        };
-        let target = at.rest_distance + nearer;
-        let reach = (target + path).min(self.wanted.max(target)); // NaN is never reached
-        let beyond = reach > reduction.known_within(self.radius); // false for NaN
-        if !beyond || !reach.is_finite() {
-            return false;
-        }
-        let surfaces = SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, None);
-        let pairs = self.settings.look_ahead_pairs * answers.len() as u64;
-        let pairs = match (purpose.is_felt(), self.was_stopped) {
-            (false, _) => pairs / SEARCH_FACTOR,
-            (true, false) => pairs,
-            (true, true) => pairs * SEARCH_FACTOR,
-        };
-        let mut any = false;
-        for index in 0..at.places.len() {
-            if !at.places[index].chosen || !reduction.conforms(at, index) {
-                continue;
-            }
-            let asked = Violated {
-                motions: answers,
-                center: at.center(),
-                target: target - at.tolerance,
-                reach,
-                pairs,
-            };
-            for_violated(
-                (&at.world.body.mesh, &at.pose),
-                at.obstacle(index),
-                u16::try_from(index).unwrap_or(u16::MAX),
-                &asked,
-                &mut self.collision,
-                work,
-                |contact| {
-                    any |= reduction.offer_violated((at, &surfaces), answers, purpose, contact);
-                },
-            );
-        }
-        any
     }
 
     /// The candidates of the present pose, within the distance of the last collection.
@@ -221,7 +160,8 @@ impl GodObject {
         };
         if let Some(at) = self.place() {
             let answers = self.answers(&mut reduction, &at, motions, purpose, work);
-            let searched = &answers[..answers.len().min(SEARCHED_MOTIONS)];
+            let count = answers.len().min(SEARCHED_MOTIONS);
+            let searched = (&motions[..count], &answers[..count]);
             if self.search(&mut reduction, &at, searched, purpose, work) {
                 self.answers(&mut reduction, &at, motions, purpose, work);
             }

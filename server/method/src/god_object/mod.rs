@@ -20,7 +20,8 @@
 //! | `projection.rs` | the rows of the present set and Eq. (1) on them                                   |
 //! | `free_motion.rs`| how far a motion is free of every obstacle                                        |
 //! | `collection.rs` | the constraint set of a pose                                                      |
-//! | `generation.rs` | rows as motions need them                                                          |
+//! | `generation.rs` | rows as motions need them                                                         |
+//! | `search.rs`     | rows that are missing, where surfaces conform                                     |
 //! | `look_ahead.rs` | how far a published set looks ahead, and what that may cost                       |
 //! | `obstacles.rs`  | obstacles that move, and the body out of their way                                |
 //! | `report.rs`     | what one update did                                                               |
@@ -34,6 +35,7 @@ mod look_ahead;
 mod obstacles;
 mod projection;
 mod report;
+mod search;
 mod simulation;
 mod start;
 mod substep;

@@ -63,7 +63,7 @@ const IDLE_UPDATES: u32 = 8;
 const IDLE_UPDATES_IMPLIED: u32 = 1;
 
 /// Pairs up to this many rest distances apart touch.
-const TOUCHING_REST_DISTANCES: f64 = 2.0;
+const TOUCHING_REST_DISTANCES: f64 = 1.5;
 /// A row of a gap up to so many rest distances holds the body, or will soon.
 const NEAR_REST_DISTANCES: f64 = 4.0;
 
