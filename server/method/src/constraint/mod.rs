@@ -9,14 +9,16 @@ mod reduction;
 mod reentrant;
 mod separation;
 mod set;
+mod violated;
 
 pub use collect::collect_contacts;
-pub(crate) use collect::{Nearest, Violated, collect_bounded, for_violated, in_world};
+pub(crate) use collect::{Nearest, collect_bounded, in_world};
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
 pub(crate) use reduction::{At, MAX_ROWS, Place, Purpose, RowReduction, Surfaces};
 pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};
+pub(crate) use violated::{Violated, for_violated};
 
 pub(crate) use facing::{
     LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_in_edge_cone, is_in_vertex_cone, is_over,
