@@ -63,10 +63,12 @@ const IDLE_UPDATES: u32 = 8;
 const IDLE_UPDATES_IMPLIED: u32 = 1;
 
 /// Pairs up to this many rest distances apart touch.
-const TOUCHING_REST_DISTANCES: f64 = 1.5;
+const TOUCHING_REST_DISTANCES: f64 = 2.0;
 /// A row of a gap up to so many rest distances holds the body, or will soon.
 const NEAR_REST_DISTANCES: f64 = 4.0;
 
+/// Where a collection has pairs up to so many rest distances, no more are searched for. With 2 pegs cost a third more, and no force of them is nearer.
+const COLLECTED_REST_DISTANCES: f64 = 1.5;
 /// A collection reaches for so many times what the last one was complete within, where that was given up.
 const REACH_GROWTH: f64 = 2.0;
 
@@ -330,7 +332,7 @@ impl RowReduction {
         self.truncated |= within < touching.min(self.asked);
         self.candidates.complete_within = self.candidates.complete_within.min(within);
         let searched = if self.conforms(at, obstacle) {
-            touching
+            COLLECTED_REST_DISTANCES * at.rest_distance
         } else {
             0.0
         };
@@ -366,8 +368,8 @@ impl RowReduction {
 
     /// Whether the last collection of an obstacle was given up before it had every pair that touches: what motions violate is searched for there.
     pub(crate) fn conforms(&self, at: &At, obstacle: usize) -> bool {
-        let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
-        self.next_reach[obstacle] < REACH_GROWTH * touching
+        let collected = COLLECTED_REST_DISTANCES * at.rest_distance;
+        self.next_reach[obstacle] < REACH_GROWTH * collected
     }
 
     fn knows(&self, features: &FeaturePair) -> bool {
