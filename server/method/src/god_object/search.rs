@@ -15,9 +15,9 @@ use crate::spatial::Vector6;
 
 /// How much more work a search for the force may take where an obstacle stopped the body in this update, which says that pairs are missing; and how much
 /// less a search for a motion, which needs no more than what it violates deepest: an obstacle stops it otherwise. Of 310 variants of conforming
-/// parts (`conforming_variants --quick`, seeds 1 to 12) the force is off by at most 71, 71, 6 and 6 % with 4, 8, 16 and 64 times as much.
+/// parts (`conforming_variants --quick`, seeds 1 to 12) the force is off by at most 71, 6 and 6 % with 4, 16 and 64 times as much.
 const SEARCH_FACTOR: u64 = 16;
-/// A force is right to this share: no more rows are searched for where they could not change it by more.
+/// No rows are searched for where they could not change the force by more than this share of it.
 const FORCE_ACCURACY: f64 = 1e-3;
 
 impl GodObject {
