@@ -6,8 +6,6 @@
 #[path = "../tests/geometry_shapes/mod.rs"]
 mod geometry_shapes;
 mod scene;
-#[path = "../examples/update_support/mod.rs"]
-mod update_support;
 
 use divan::{Bencher, black_box};
 use god_object::{Coupling, GodObject};

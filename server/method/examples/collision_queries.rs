@@ -16,8 +16,6 @@ mod exact_collision;
 #[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/geometry_shapes/mod.rs"]
 mod geometry_shapes;
-#[path = "update_support/mod.rs"]
-mod update_support;
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -31,7 +29,7 @@ use god_object::collision::{
 use god_object::nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion};
 use god_object::{Mesh, Pose, Vector6};
 use plotters::prelude::*;
-use update_support::thread_cpu_us;
+use taut_test_kit::thread_cpu_us;
 
 const RELATIVE_GAPS: [f64; 11] = [
     1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12,

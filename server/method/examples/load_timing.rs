@@ -11,13 +11,12 @@
 #[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/geometry_shapes/mod.rs"]
 mod geometry_shapes;
-mod update_support;
 
 use std::sync::Arc;
 
 use god_object::geometry::mass_properties;
 use god_object::{Body, Coupling, GodObject, Mesh, Obstacle, Pose, Settings, Surface, World};
-use update_support::{subdivided, thread_cpu_us};
+use taut_test_kit::{subdivided, thread_cpu_us};
 
 const MESH: &str = "bunny_27k.ply";
 const MIB: f64 = 1024.0 * 1024.0;

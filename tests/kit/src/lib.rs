@@ -1,6 +1,15 @@
-//! What tests of several packages share.
+//! What tests, benches and examples of several packages share.
+
+mod clock;
+mod dense;
+mod hand;
+mod random;
 
 use std::fmt::Display;
+
+pub use clock::thread_cpu_us;
+pub use dense::{Soup, subdivided};
+pub use hand::SlidingHand;
 
 /// A scene: a ball over a half-space, both exact: 1000 N/m.
 pub const BALL_ON_FLOOR: &str = r#"

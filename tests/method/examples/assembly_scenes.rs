@@ -3,13 +3,10 @@
 //!
 //! Prints a table: a line for each scene and hand; times are CPU time of the thread for an update, its force and the hand. Every pose is checked for penetration by code that shares nothing with the method.
 
-#[path = "../../../server/method/examples/update_support/mod.rs"]
-mod update_support;
-
 use indicatif::{ProgressBar, ProgressStyle};
 use taut_method_tests::assembly::{ASSEMBLIES, Assembly, Outcome};
 use taut_method_tests::hand::HandError;
-use update_support::thread_cpu_us;
+use taut_test_kit::thread_cpu_us;
 
 /// Length of the progress bar.
 const PARTS: u64 = 1000;

@@ -6,16 +6,13 @@
 //! name begins so; `--quick` runs coarser meshes, 2,000 triangles each, for a hundred updates. `--seeds N` runs the designs of the seeds 1 to N, without
 //! the named cases and the bunnies, and prints those rows alone whose force is off by more than 1 %.
 
-#[path = "../../../server/method/examples/update_support/mod.rs"]
-mod update_support;
-
 #[path = "conforming_variants/bunnies.rs"]
 mod bunnies;
 
 use taut_method_tests::variants::measure::{Course, Outcome, quantile, run};
 use taut_method_tests::variants::oracle::Oracle;
 use taut_method_tests::variants::{Variant, covering, named};
-use update_support::thread_cpu_us;
+use taut_test_kit::thread_cpu_us;
 
 /// A column: its heading, and the value of a case.
 type Column = (&'static str, fn(&Outcome) -> f64);

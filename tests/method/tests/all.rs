@@ -2,6 +2,7 @@
 #![allow(unreachable_pub, reason = "helpers of the tests")]
 
 mod assembly_scenes;
+mod bunnies;
 mod conforming_variants;
 mod edges;
 #[allow(

@@ -8,7 +8,7 @@ use god_object::nalgebra::Vector3;
 use god_object::{Body, Mesh, Obstacle, Pose, Settings, Surface, World};
 
 use crate::geometry_shapes::{cuboid, fine_hole, fine_peg, grid_box, hole, mesh, peg, read_ply};
-use crate::update_support::Hand;
+use taut_test_kit::SlidingHand;
 
 /// A scene by name.
 pub(crate) const NAMES: [&str; 4] = [
@@ -30,7 +30,7 @@ pub(crate) struct Scene {
 /// A closed path in time, or a hand that answers to the body.
 enum Guide {
     Path(fn(f64) -> Pose),
-    Sliding(Box<Hand>),
+    Sliding(Box<SlidingHand>),
 }
 
 /// The scenes that can be built here: the bunnies need test data.
@@ -60,7 +60,7 @@ impl Scene {
             ),
             BUNNIES => {
                 let bunny = mesh(read_ply("bunny_27k.ply").expect("listed when it is there"));
-                let hand = Hand::new(Pose::translation(0.2, 0.02, 0.0), 1);
+                let hand = SlidingHand::new(Pose::translation(0.2, 0.02, 0.0), 1);
                 Self::of(bunny.clone(), bunny, 0.15, Guide::Sliding(Box::new(hand)))
             }
             2 => Self::of(

@@ -22,7 +22,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::gaps::Gaps;
-use super::time_of_impact::{AdvancementSettings, TimeOfImpact};
+use super::impact::{AdvancementSettings, TimeOfImpact};
 use crate::geometry::distance::{closest_on_edges, closest_on_triangle};
 
 /// Rounding of a distance relative to the largest coordinate: see the file's head.

@@ -5,10 +5,12 @@ mod agenda;
 mod bands;
 mod beyond;
 mod descent;
+mod descent_in_motion;
 mod displacements;
 mod distance;
 mod facing_volumes;
 mod gaps;
+mod impact;
 mod intersection;
 mod intervals;
 mod known_apart;
@@ -25,11 +27,12 @@ mod work;
 mod workspace;
 
 pub use distance::distance;
+pub use impact::{AdvancementSettings, TimeOfImpact};
 pub use intersection::meshes_intersect;
 pub(crate) use intersection::surfaces_intersect;
 pub use linear::{edge_edge_time_of_impact, vertex_face_time_of_impact};
 pub use motion::Motion;
-pub use time_of_impact::{AdvancementSettings, TimeOfImpact, time_of_impact};
+pub use time_of_impact::time_of_impact;
 pub use work::Work;
 pub use workspace::CollisionWorkspace;
 

@@ -1,56 +1,16 @@
 //! Bunnies: updates of one that a hand slides over the other, and searches for the time of impact of given motions.
 
 use std::collections::HashMap;
-use std::sync::Arc;
 
 use god_object::collision::{
     AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
 };
-use god_object::{GodObject, Mesh, Pose, Settings, Vector6, World};
-use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use taut_method_tests::solids::{body, obstacle};
+use god_object::{Mesh, Pose, Vector6};
+use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion};
+use taut_method_tests::variants::bunnies::{SLIDES, Slide, load};
 use taut_method_tests::variants::measure::quantile;
-use taut_method_tests::variants::oracle::Oracle;
-use taut_scene::{data_file, read_mesh};
-
-use crate::update_support::{Hand, subdivided, thread_cpu_us};
-
-const SIZE: f64 = 0.15;
-/// Updates before the body has come to the obstacle.
-const APPROACH: usize = 60;
-/// Every so many sets are held against the oracle.
-const ERROR_STRIDE: usize = 5;
-
-/// A bunny on a bunny that a hand slides over it.
-struct Slide {
-    name: &'static str,
-    /// Shortest and longest step of the hand, m.
-    step: [f64; 2],
-    updates: usize,
-    /// Each makes four triangles of one.
-    subdivisions: u32,
-}
-
-const SLIDES: [Slide; 3] = [
-    Slide {
-        name: "bunnies",
-        step: [0.3e-3, 1.4e-3],
-        updates: 2500,
-        subdivisions: 0,
-    },
-    Slide {
-        name: "bunnies-fast",
-        step: [0.5e-3, 3e-3],
-        updates: 2500,
-        subdivisions: 0,
-    },
-    Slide {
-        name: "bunnies-1.7M",
-        step: [0.5e-3, 3e-3],
-        updates: 120,
-        subdivisions: 3,
-    },
-];
+use taut_scene::data_file;
+use taut_test_kit::thread_cpu_us;
 
 /// The cases whose name begins with `case`; the dense one only where it is named.
 pub(crate) fn run(case: &str, repeats: usize) {
@@ -75,23 +35,12 @@ pub(crate) fn run(case: &str, repeats: usize) {
     }
 }
 
-fn load(name: &str) -> Option<Mesh> {
-    let raw = read_mesh(&data_file(name)?).ok()?;
-    Mesh::new(raw.vertices, raw.triangles).ok()
-}
-
 fn run_slide(slide: &Slide, bunny: &Mesh, repeats: usize) {
-    let soup = (bunny.vertices().to_vec(), bunny.triangles().to_vec());
-    let (vertices, triangles) = subdivided(&soup, slide.subdivisions);
-    let mesh = Mesh::new(vertices, triangles).expect("a subdivided bunny is closed");
-    let world = Arc::new(World {
-        body: body(mesh.clone()),
-        obstacles: vec![obstacle("bunny", mesh, Pose::identity())],
-    });
-    let runs: Vec<[f64; 4]> = (0..repeats).map(|_| updates(&world, slide, None)).collect();
+    let world = slide.world(bunny);
+    let timed = |_| quantiles(&slide.times(&world, thread_cpu_us));
+    let runs: Vec<[f64; 4]> = (0..repeats).map(timed).collect();
     print_medians(slide.name, &runs);
-    let mut errors = Vec::new();
-    updates(&world, slide, Some(&mut errors));
+    let errors = slide.errors(&world);
     let share = |of| 100.0 * quantile(&errors, of);
     println!(
         "{:20} force off by {:.2} % at p90, {:.2} % at p99, {:.2} % at most, of {} sets",
@@ -101,32 +50,6 @@ fn run_slide(slide: &Slide, bunny: &Mesh, repeats: usize) {
         share(1.0),
         errors.len()
     );
-}
-
-/// p50, p99, p99.9 and the greatest time of an update, us. With `errors`: how far published sets are from every pair, for the device one step on.
-fn updates(world: &Arc<World>, slide: &Slide, mut errors: Option<&mut Vec<f64>>) -> [f64; 4] {
-    let start = Pose::new(Vector3::new(0.16, 0.02, 0.0), Vector3::new(0.0, 2.0, 0.0));
-    let settings = Settings::for_size(SIZE);
-    let mut god_object =
-        GodObject::new(Arc::clone(world), settings, start).expect("apart at the start");
-    let mut oracle = errors.as_ref().map(|_| Oracle::default());
-    let mut hand = Hand::with_steps(start, 1, slide.step);
-    let mut times = Vec::new();
-    for k in 0..APPROACH + slide.updates {
-        let device = hand.next(god_object.pose());
-        if let (Some(errors), Some(oracle)) = (&mut errors, &mut oracle)
-            && k > APPROACH
-            && k % ERROR_STRIDE == 0
-        {
-            errors.push(oracle.compare(world, &god_object, &device).relative);
-        }
-        let clock = thread_cpu_us();
-        god_object.step(&device, None);
-        if k >= APPROACH {
-            times.push(thread_cpu_us() - clock);
-        }
-    }
-    quantiles(&times)
 }
 
 /// The motions of `bunny_contacts.csv` on a fresh workspace each: time of a search, and whether it was right.

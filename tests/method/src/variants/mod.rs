@@ -5,7 +5,9 @@
 //! - [`scene`]: a variant as a world, settings and the path of a hand.
 //! - [`oracle`]: the force by every facing pair within reach.
 //! - [`measure`]: one variant led along its path: times, rows, error against the oracle, penetrations.
+//! - [`bunnies`]: no variant: two organic bodies that a hand slides over each other.
 
+pub mod bunnies;
 pub mod covering;
 pub mod measure;
 pub mod oracle;

@@ -1,0 +1,248 @@
+//! Descent of two trees whose bodies move: pairs of volumes in the order of the windows of time in which they may be near.
+
+use pulp::{Simd, WithSimd};
+
+use super::advancement::{PairSearch, TrianglePair};
+use super::agenda::{Agenda, Part, Waiting};
+use super::descent::{AT_ONCE, OpenedInMotion, at_once, open_in_motion};
+use super::impact::{AdvancementSettings, First};
+use super::intervals::{Interval, Intervals, WHOLE, halvings};
+use super::motion::RelativeMotion;
+use super::turned::TurnedNodes;
+use super::windows::Window;
+use super::work::Work;
+use super::workspace::CollisionWorkspace;
+use crate::geometry::Mesh;
+use crate::geometry::wide_tree::{Below, ROOT, WideTree};
+
+/// When volumes come near is worked out where the body moves by more than this share of the larger one's radius in half an interval. Otherwise
+/// they count as near in all of the window of what they are in, which is the cheaper test.
+const TIMED_SHARE: f32 = 0.5;
+
+/// A body on its way and an obstacle.
+pub(super) struct Problem<'a> {
+    pub(super) body: &'a Mesh,
+    pub(super) obstacle: &'a Mesh,
+    pub(super) relative: &'a RelativeMotion,
+    pub(super) settings: &'a AdvancementSettings,
+}
+
+impl Problem<'_> {
+    #[inline]
+    pub(super) fn pair(&self, a: u32, b: u32) -> TrianglePair {
+        TrianglePair {
+            on_body: self.body.corners(a),
+            body_normal: *self.body.face_normal(a),
+            on_obstacle: self.obstacle.corners(b),
+            obstacle_normal: *self.obstacle.face_normal(b),
+        }
+    }
+}
+
+/// A search for every pair of triangles that may face each other within the gap at some time before the first impact so far, with the vectors
+/// that the processor has.
+pub(super) struct DescentInMotion<'a, 'p> {
+    pub(super) problem: &'a Problem<'p>,
+    pub(super) search: &'a PairSearch<'p>,
+    pub(super) first: &'a mut First,
+    pub(super) workspace: &'a mut CollisionWorkspace,
+    pub(super) work: &'a mut Work,
+}
+
+/// Pairs of volumes that wait: those under way, last in, first out; and those that come near later.
+struct Queue<'a> {
+    stack: &'a mut Vec<Waiting>,
+    agenda: &'a mut Agenda,
+    /// Parts of the time that is searched: the one looked at, and that of the first impact.
+    now: Part,
+    last: Part,
+}
+
+impl Queue<'_> {
+    #[inline(always)]
+    fn push(&mut self, part: Part, waiting: Waiting) {
+        if part <= self.now || !self.agenda.push(part, waiting) {
+            self.stack.push(waiting);
+        }
+    }
+
+    /// The agenda has its turn when nothing earlier is under way.
+    #[inline(always)]
+    fn pop(&mut self, nothing_under_way: bool) -> Option<Waiting> {
+        self.stack.pop().or_else(|| {
+            let (part, next) = nothing_under_way.then(|| self.agenda.pop(self.last))??;
+            self.now = part;
+            Some(next)
+        })
+    }
+}
+
+/// What the intervals of a motion are made from, and how short they may be.
+struct Halving<'a> {
+    problem: &'a Problem<'a>,
+    intervals: &'a mut Intervals,
+    trees: (&'a WideTree, &'a WideTree),
+    /// Most halvings.
+    most: u32,
+    /// Share of the larger volume's radius that a path may stray from a straight one.
+    share: f32,
+}
+
+impl Halving<'_> {
+    #[inline(always)]
+    fn interval(&mut self, number: u32, turned: &mut TurnedNodes) -> &Interval {
+        self.intervals
+            .get(number, self.problem.relative, self.trees, turned)
+    }
+
+    /// Halves the interval of a pair until the path of its volumes is straight in it: the half without a part of the window is left out; of two, the later one waits.
+    #[inline(always)]
+    fn straighten(
+        &mut self,
+        next: &mut Waiting,
+        size: f32,
+        queue: &mut Queue<'_>,
+        turned: &mut TurnedNodes,
+        work: &mut Work,
+    ) {
+        let (most, tree, longest) = (self.most, self.trees.0, self.share * size);
+        loop {
+            let number = next.interval;
+            let interval = self.interval(number, turned);
+            let straight = number.ilog2() >= most
+                || !interval
+                    .volumes
+                    .strays_more_than(longest, tree, next.pair.0);
+            if straight {
+                return;
+            }
+            work.node_pairs += 1;
+            if next.window.leave < 0.0 {
+                next.window = next.window.in_first_half();
+                next.interval = 2 * number;
+            } else if next.window.enter > 0.0 {
+                next.window = next.window.in_second_half();
+                next.interval = 2 * number + 1;
+            } else {
+                let later = Waiting {
+                    pair: next.pair,
+                    interval: 2 * number + 1,
+                    window: next.window.in_second_half(),
+                };
+                queue.push(interval.part(0.0), later);
+                next.window = next.window.in_first_half();
+                next.interval = 2 * number;
+            }
+        }
+    }
+}
+
+impl WithSimd for DescentInMotion<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self {
+            problem,
+            search,
+            first,
+            workspace,
+            work,
+        } = self;
+        let trees = (problem.body.wide_tree(), problem.obstacle.wide_tree());
+        let CollisionWorkspace {
+            agenda,
+            stack,
+            witnesses,
+            intervals,
+            turned,
+            ..
+        } = workspace;
+        intervals.restart(first.time, search.gaps.stop);
+        let mut halving = Halving {
+            problem,
+            intervals,
+            trees,
+            most: halvings(problem.settings.max_intervals),
+            share: problem.settings.interval_edges as f32,
+        };
+        stack.clear();
+        agenda.clear();
+        stack.push(Waiting {
+            pair: (ROOT, ROOT),
+            interval: WHOLE,
+            window: Window::WHOLE,
+        });
+        let mut queue = Queue {
+            stack,
+            agenda,
+            now: Part::FIRST,
+            last: Part::of(1.0),
+        };
+        let end = first.time;
+        let mut opened = [(OpenedInMotion::NONE, WHOLE); AT_ONCE];
+        loop {
+            let (most, mut count) = (at_once(queue.stack.len()), 0);
+            while count < most
+                && let Some(mut next) = queue.pop(count == 0)
+            {
+                let (a, b) = next.pair;
+                let size = trees.0.radius(a).max(trees.1.radius(b));
+                halving.straighten(&mut next, size, &mut queue, turned, work);
+                let interval = halving.interval(next.interval, turned);
+                let [from, to] = interval.times(next.window);
+                let to = to.min(first.time);
+                let later = from >= first.time || (first.is_near() && from > 0.0);
+                if (later && from > 0.0) || first.overlapping {
+                    continue;
+                }
+                if let (Below::Triangle(t), Below::Triangle(s)) =
+                    (trees.0.below(a), trees.1.below(b))
+                {
+                    work.triangle_pairs += 1;
+                    let pair = problem.pair(t, s);
+                    let times = [interval.from, from, to];
+                    if !search.is_free(&pair, &interval.start, times, &first.lately)
+                        && !witnesses.contains(&(t, s))
+                    {
+                        let start = if from > interval.from {
+                            problem.relative.at(from)
+                        } else {
+                            interval.start
+                        };
+                        let outcome =
+                            search.follow(&pair, &start, [from, to], &mut first.lately, work);
+                        first.take(outcome, (t, s), from);
+                        queue.last = Part::of((first.time / end) as f32);
+                    }
+                    continue;
+                }
+                work.node_pairs += 1;
+                let volumes = &interval.volumes;
+                let timed = volumes.sweeps_more_than(TIMED_SHARE * size);
+                let pair = if timed {
+                    open_in_motion::<true>(trees, volumes, turned, (a, b), next.window)
+                } else {
+                    open_in_motion::<false>(trees, volumes, turned, (a, b), next.window)
+                };
+                opened[count] = (pair, next.interval);
+                count += 1;
+            }
+            if count == 0 {
+                break;
+            }
+            // What waited last goes on first.
+            for (opened, number) in opened[..count].iter().rev() {
+                let interval = halving.interval(*number, turned);
+                opened.for_each(|pair, window| {
+                    let next = Waiting {
+                        pair,
+                        interval: *number,
+                        window,
+                    };
+                    queue.push(interval.part(window.enter), next);
+                });
+            }
+        }
+    }
+}
