@@ -7,6 +7,7 @@ use crate::random::Random;
 /// A hand that presses a body towards the origin and slides it around, a step at a time.
 #[derive(Debug)]
 pub struct SlidingHand {
+    /// Where the device is.
     pub pose: Isometry3<f64>,
     random: Random,
     axis: Vector3<f64>,
@@ -23,11 +24,13 @@ impl SlidingHand {
     /// The hand does not turn further from the body than this, rad: a hand feels the torque.
     const TWIST: f64 = 3.0_f64.to_radians();
 
+    /// A hand at `pose`; its steps follow from the seed.
     #[must_use]
     pub fn new(pose: Isometry3<f64>, seed: u64) -> Self {
         Self::with_steps(pose, seed, Self::STEP)
     }
 
+    /// The same with its shortest and longest step, m.
     #[must_use]
     pub fn with_steps(pose: Isometry3<f64>, seed: u64, step: [f64; 2]) -> Self {
         Self {
