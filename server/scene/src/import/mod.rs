@@ -6,6 +6,7 @@ mod crossing;
 mod edges;
 mod faces;
 mod folder;
+mod hand_path;
 mod holes;
 mod manifold;
 mod orientation;
@@ -33,14 +34,17 @@ use crate::progress::Progress;
 use crate::scene::{GOD_OBJECT_NAME, RESERVED_NAMES, Scene};
 use crate::simplify::simplify;
 use folder::NewFolder;
+use hand_path::hand_path;
 use repair::{Repaired, Wishes, is_single, repair};
 use report::Places;
-use scene_text::{Placed, around, clear_above, scene_text, sphere_radius};
+use scene_text::{HAND_SECTION, Placed, around, clear_above, scene_text, sphere_radius};
 
 /// Parts whose middle is farther from the origin than so many of their diagonals are moved there together.
 const FAR_AWAY: f64 = 2.0;
 /// Name of the scene file in the folder.
 const SCENE_FILE: &str = "scene.toml";
+/// Name of the path of the simulated hand there.
+const HAND_FILE: &str = "hand.csv";
 
 /// What to import, and how.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -294,8 +298,24 @@ fn write_scene(
         folder.write(SCENE_FILE, text.as_bytes())?;
         let path = folder.partial().join(SCENE_FILE);
         match Scene::load(&path).and_then(|scene| scene.build()) {
-            Ok(_) => {
+            Ok(built) => {
                 notes.extend(scene_note(held, obstacles, first_error.is_some(), start));
+                if obstacles.is_empty() {
+                    return Ok(());
+                }
+                let way = match held {
+                    Some(part) if first_error.is_none() => {
+                        middle - nalgebra::center(&part.low, &part.high)
+                    }
+                    Some(_) => -start.coords,
+                    None => middle - start,
+                };
+                let size = around(placed).map_or(0.0, |(low, high)| (high - low).max());
+                if let Some(path) = hand_path(&built, &way, size) {
+                    folder.write(HAND_FILE, path.text.as_bytes())?;
+                    folder.write(SCENE_FILE, (text + HAND_SECTION).as_bytes())?;
+                    notes.push(hand_note(path.meets));
+                }
                 return Ok(());
             }
             Err(error) => {
@@ -308,6 +328,15 @@ fn write_scene(
         problem.file = request.folder.join(SCENE_FILE).display().to_string();
     }
     FileError::unless_empty(problems)
+}
+
+fn hand_note(meets: bool) -> String {
+    let how = if meets {
+        "against the others"
+    } else {
+        "and meets nothing on its first way"
+    };
+    format!("{HAND_FILE}: a simulated hand leads the god-object {how}, to and fro there, and back")
 }
 
 fn scene_note(

@@ -15,6 +15,13 @@ const START_GAP: f64 = 0.1;
 /// Radius of the sphere in the hand, as a share of the longest side of all parts.
 const SPHERE_SHARE: f64 = 0.05;
 
+/// What a scene says of the simulated hand, whose path lies beside it.
+pub(super) const HAND_SECTION: &str = "
+[hand]
+path = \"hand.csv\"    # what a simulated hand intends; a device or a hand of your own needs none
+loop = true
+";
+
 /// A part in the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Placed {
@@ -72,7 +79,7 @@ pub(super) fn scene_text(
     text.push_str(
         "mass = 1.0    # kg; or density = 1000.0, kg/m^3. The stiffness grows with the mass.\n",
     );
-    let [x, y, z] = start.into();
+    let [x, y, z] = start.coords.map(six_digits).into();
     let _ = writeln!(
         text,
         "pose = {{ position = [{x:?}, {y:?}, {z:?}], rotation = [1.0, 0.0, 0.0, 0.0] }}    # m; w x y z"
@@ -138,6 +145,11 @@ fn to_millimetres(metres: f64) -> f64 {
 /// Two significant digits, for people who read the file.
 fn two_digits(value: f64) -> f64 {
     format!("{value:.1e}").parse().unwrap_or(value)
+}
+
+/// Six significant digits.
+fn six_digits(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 fn quoted(text: &str) -> String {

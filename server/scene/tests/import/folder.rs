@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use god_object::spatial::{Pose, linear};
+use god_object::{Coupling, GodObject};
 use taut_scene::{ImportRequest, Scene, check, import, import_unless};
 
 use super::solids::{Soup, moved, part, scaled};
@@ -84,6 +86,61 @@ fn all_parts_stand_below_a_sphere_where_that_is_asked() {
         .unwrap();
     assert!(built.world.body.primitive.is_some());
     assert_eq!(built.bodies[1].name, "a");
+}
+
+/// Largest force, N, and farthest way behind the hand, in shares of the body's size, along the straight ways between the via points of an imported scene.
+fn felt_on_the_way(scene: &Path) -> [f64; 2] {
+    let built = Scene::load(scene).and_then(|scene| scene.build()).unwrap();
+    let hand = built.hand.as_ref().expect("a hand");
+    let via = hand.path.samples();
+    let between = |a: &Pose, b: &Pose| (a.translation.vector - b.translation.vector).norm();
+    assert!(between(&via[0].pose, &built.start) < 1e-6 * built.size);
+    let world = std::sync::Arc::new(built.world.clone());
+    let mut god_object = GodObject::new(world, built.settings, built.start).unwrap();
+    let mut coupling = Coupling::new(&built.world, &built.settings);
+    let mut felt = [0.0_f64; 2];
+    for (k, leg) in via.windows(2).enumerate() {
+        for step in 1..=200 {
+            let device = leg[0]
+                .pose
+                .lerp_slerp(&leg[1].pose, f64::from(step) / 200.0);
+            god_object.step(&device, None);
+            let time = k as f64 + f64::from(step) * 5e-3;
+            let output = coupling.step(time, &device, god_object.constraint_set());
+            felt[0] = felt[0].max(linear(&output.wrench).norm());
+            felt[1] = felt[1].max(between(&device, god_object.pose()) / built.size);
+        }
+    }
+    felt
+}
+
+/// A part in the hand beside others and on them, and a sphere over one; small, as they are, and large.
+#[test]
+fn a_simulated_hand_meets_what_was_imported() {
+    for size in [0.05, 1.0, 20.0] {
+        let beside = moved(part(), [0.1, 0.0, 0.0]);
+        let on = moved(part(), [0.02, 0.0, 0.0]);
+        for (other, obstacles_only) in [(beside, false), (on.clone(), false), (on, true)] {
+            let parts = Parts::new(&[
+                ("a.ply", &scaled(part(), size)),
+                ("b.ply", &scaled(other, size)),
+            ]);
+            let request = ImportRequest {
+                obstacles_only,
+                ..parts.request(&["a.ply", "b.ply"])
+            };
+            let report = import(&request).unwrap();
+            let note = report.notes.last().expect("a note");
+            assert!(
+                note.contains("hand.csv") && note.contains("against"),
+                "{note}"
+            );
+            let [force, behind] = felt_on_the_way(Path::new(&report.scene));
+            println!("{size}: {force} N, behind by {behind}");
+            assert!((0.1..40.0).contains(&force), "{size}: {force} N");
+            assert!((0.005..2.0).contains(&behind), "{size}: {behind}");
+        }
+    }
 }
 
 #[test]
