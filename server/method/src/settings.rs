@@ -13,6 +13,10 @@
 //!
 //! Source: Ortega et al. 2007, Sections 4, 5 and 6. The lengths derive from one: the size of the body.
 
+mod check;
+
+pub use check::SettingsError;
+
 use crate::quasi_statics::SolverKind;
 
 /// Rest distance per metre of body size: 10 um for a body of 0.1 m. People feel nothing below 50 um, and a clearance of
@@ -201,140 +205,6 @@ impl Settings {
             bound.max(0.0)
         }
     }
-
-    /// Says what is out of range, by the key's name.
-    pub fn validate(&self) -> Result<(), SettingsError> {
-        let positive = [
-            ("k_s", self.k_s),
-            ("k_h", self.k_h),
-            ("force_limit", self.force_limit),
-            ("torque_limit", self.torque_limit),
-            ("minimum_gap", self.minimum_gap),
-            ("gap_tolerance", self.gap_tolerance),
-            ("motion_tolerance", self.motion_tolerance),
-        ];
-        for (key, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(SettingsError::NotPositive { key, value });
-            }
-        }
-        if self.k_s > 1.0 {
-            return Err(SettingsError::Above {
-                key: "k_s",
-                value: self.k_s,
-                limit: 1.0,
-            });
-        }
-        if let RotationMetric::RadiusOfGyration(radius) = self.rotation_metric
-            && !(radius.is_finite() && radius > 0.0)
-        {
-            return Err(SettingsError::NotPositive {
-                key: "rotation_metric",
-                value: radius,
-            });
-        }
-        if let Some(adaptation) = self.adaptation {
-            if !(adaptation.duration.is_finite() && adaptation.duration >= 0.0) {
-                return Err(SettingsError::NotPositive {
-                    key: "adaptation.duration",
-                    value: adaptation.duration,
-                });
-            }
-            if !(adaptation.threshold.is_finite() && adaptation.threshold <= 0.0) {
-                return Err(SettingsError::Above {
-                    key: "adaptation.threshold",
-                    value: adaptation.threshold,
-                    limit: 0.0,
-                });
-            }
-        }
-        let ordered = [
-            (
-                "minimum_gap + gap_tolerance",
-                self.minimum_gap + self.gap_tolerance,
-                "rest_distance",
-                self.rest_distance,
-            ),
-            (
-                "rest_distance",
-                self.rest_distance,
-                "activation_distance",
-                self.activation_distance,
-            ),
-        ];
-        for (smaller, small, larger, large) in ordered {
-            let in_order = small < large; // false for NaN
-            if !in_order {
-                return Err(SettingsError::NotOrdered {
-                    smaller,
-                    small,
-                    larger,
-                    large,
-                });
-            }
-        }
-        if !(self.damping_time.is_finite() && self.damping_time >= 0.0) {
-            return Err(SettingsError::NotPositive {
-                key: "damping_time",
-                value: self.damping_time,
-            });
-        }
-        if !(self.look_ahead_limit.is_finite() && self.look_ahead_limit >= 0.0) {
-            return Err(SettingsError::NotPositive {
-                key: "look_ahead_limit",
-                value: self.look_ahead_limit,
-            });
-        }
-        if self.implicit_rounds > MAX_IMPLICIT_ROUNDS {
-            return Err(SettingsError::Above {
-                key: "implicit_rounds",
-                value: f64::from(self.implicit_rounds),
-                limit: f64::from(MAX_IMPLICIT_ROUNDS),
-            });
-        }
-        if self.max_constraints == 0 || self.max_substeps == 0 || self.max_advancement_steps == 0 {
-            return Err(SettingsError::ZeroCapacity);
-        }
-        Ok(())
-    }
-}
-
-/// What is wrong with the settings.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum SettingsError {
-    /// A number that must be positive and finite is not.
-    #[error("{key} is {value}, but must be a finite number greater than zero")]
-    NotPositive {
-        /// The setting's name.
-        key: &'static str,
-        /// What was given.
-        value: f64,
-    },
-    /// A number is above what the method allows.
-    #[error("{key} is {value}, but must not be above {limit}")]
-    Above {
-        /// The setting's name.
-        key: &'static str,
-        /// What was given.
-        value: f64,
-        /// The largest allowed value.
-        limit: f64,
-    },
-    /// Two lengths are the wrong way round.
-    #[error("{smaller} ({small} m) must be smaller than {larger} ({large} m)")]
-    NotOrdered {
-        /// The name of the length that must be smaller.
-        smaller: &'static str,
-        /// Its value, m.
-        small: f64,
-        /// The name of the length that must be larger.
-        larger: &'static str,
-        /// Its value, m.
-        large: f64,
-    },
-    /// A capacity or iteration limit is zero.
-    #[error("max_constraints, max_substeps and max_advancement_steps must be at least 1")]
-    ZeroCapacity,
 }
 
 #[cfg(test)]

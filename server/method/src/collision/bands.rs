@@ -12,21 +12,17 @@
 use pulp::{Simd, WithSimd};
 
 use super::descent::{Opened, open};
-use super::displacements::Motions;
-use super::facing_volumes::{FacingVolumes, Side};
-use super::single::larger;
+use super::facing_volumes::FacingVolumes;
 use super::turned::TurnedNodes;
 use super::work::Work;
-use crate::geometry::lanes::{LANES, Lanes};
+use crate::geometry::lanes::LANES;
 use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
 
 /// Number of bands, K. The first is a two-thousandth of the margin wide. More of them would leave the trees' nodes in an order that the cache
 /// does not like.
-const BANDS: usize = 12;
+pub(super) const BANDS: usize = 12;
 /// Pairs that wait at a time. One that finds no room ends the search there.
 const CAPACITY: usize = 1 << 15;
-/// Nodes of each tree whose motions are kept.
-const KEPT: usize = 32;
 /// Share of a band's edge that single precision may have got wrong.
 const EDGE_ROUNDING: f64 = 1e-5;
 /// Marks the end of a list.
@@ -35,7 +31,7 @@ const NONE: u32 = u32::MAX;
 /// Bands of a search by clearance: as many for what is violated, the deepest first.
 const SIGNED_BANDS: usize = 2 * BANDS;
 /// The band of what is left out.
-const OUT_OF_QUESTION: u32 = SIGNED_BANDS as u32;
+pub(super) const OUT_OF_QUESTION: u32 = SIGNED_BANDS as u32;
 
 /// Pairs that wait, by band; the last one of a band is the first out. No allocation after `new`.
 #[derive(Clone, Debug)]
@@ -109,7 +105,7 @@ fn edge(band: usize, margin: f64) -> f64 {
 
 /// The band of a share `d / D`; NaN is near. Without branches: the compiler makes vectors of eight.
 #[inline(always)]
-fn band_of(share: f32) -> u32 {
+pub(super) fn band_of(share: f32) -> u32 {
     const LAST: u32 = BANDS as u32 - 1;
     // The exponent of the number says how often the margin is halved.
     let exponent = share.max(f32::MIN_POSITIVE).to_bits() >> 23;
@@ -147,20 +143,20 @@ pub(crate) fn for_nearest_triangle_pairs(
 
 /// In which band each pair of volumes is that was opened; [`OUT_OF_QUESTION`] leaves a pair out. No closure: it is to be compiled with the vectors of the
 /// search that it is part of.
-trait Order {
+pub(super) trait Order {
     fn bands(&mut self, opened: &Opened) -> [u32; LANES];
 }
 
 /// A search that visits pairs of triangles in the order of their bands. The answer is the band in which it ended because `visit` returned false or there was no room.
-struct ByBand<'a, W, O, V> {
-    trees: (&'a WideTree, &'a WideTree),
-    volumes: &'a FacingVolumes,
-    bands: &'a mut Bands,
-    turned: &'a mut TurnedNodes,
-    work: &'a mut Work,
-    wanted: W,
-    order: O,
-    visit: V,
+pub(super) struct ByBand<'a, W, O, V> {
+    pub(super) trees: (&'a WideTree, &'a WideTree),
+    pub(super) volumes: &'a FacingVolumes,
+    pub(super) bands: &'a mut Bands,
+    pub(super) turned: &'a mut TurnedNodes,
+    pub(super) work: &'a mut Work,
+    pub(super) wanted: W,
+    pub(super) order: O,
+    pub(super) visit: V,
 }
 
 /// The whole search with the vectors that the processor has: a call for each pair of volumes would cost as much as what it tells.
@@ -221,47 +217,6 @@ where
     }
 }
 
-/// The band of a signed share: what is deepest comes first, what is farthest last. Without branches, as [`band_of`].
-#[inline(always)]
-fn signed_band_of(share: f32) -> u32 {
-    const ALL: u32 = BANDS as u32;
-    let band = band_of(share.abs());
-    if share < 0.0 {
-        ALL - 1 - band
-    } else {
-        ALL + band
-    }
-}
-
-/// The same by how far motions leave the pairs apart, deepest first: for pairs that some motion may bring below `target`, m. The motions are given as
-/// the body and as the obstacle sees them. Stops when `visit` returns false, and where there is no room.
-pub(crate) fn for_deepest_triangle_pairs(
-    trees: (&WideTree, &WideTree),
-    (volumes, margin): (&FacingVolumes, f64),
-    (motions, target): ([&Motions; 2], f32),
-    (bands, turned): (&mut Bands, &mut TurnedNodes),
-    work: &mut Work,
-    wanted: impl Fn(u8, u8) -> bool,
-    visit: impl FnMut(u32, u32, &mut Work) -> bool,
-) {
-    let order = Deepest {
-        body: Along::of(motions[0], trees.0),
-        obstacle: Along::of(motions[1], trees.1),
-        margin: margin as f32,
-        target,
-    };
-    volumes.processor.dispatch(ByBand {
-        trees,
-        volumes,
-        bands,
-        turned,
-        work,
-        wanted,
-        order,
-        visit,
-    });
-}
-
 /// By how far apart they are at least.
 struct Nearest {
     /// One over the margin, 1/m.
@@ -274,72 +229,6 @@ impl Order for Nearest {
         let mut bands = [0; LANES];
         for (k, band) in bands.iter_mut().enumerate() {
             *band = band_of(1.0 + opened.beyond(k) * self.scale);
-        }
-        bands
-    }
-}
-
-/// By how far motions leave them apart at least.
-struct Deepest<'a> {
-    body: Along<'a>,
-    obstacle: Along<'a>,
-    /// m.
-    margin: f32,
-    target: f32,
-}
-
-/// What motions do along the normals of one tree's volumes, as that tree sees them. A node is met again and again: the last ones are kept.
-struct Along<'a> {
-    motions: &'a Motions,
-    tree: &'a WideTree,
-    nodes: [u32; KEPT],
-    least: [Lanes; KEPT],
-}
-
-impl<'a> Along<'a> {
-    fn of(motions: &'a Motions, tree: &'a WideTree) -> Self {
-        Self {
-            motions,
-            tree,
-            nodes: [NONE; KEPT],
-            least: [Lanes::splat(0.0); KEPT],
-        }
-    }
-
-    /// The least for each volume of the node that holds `child`, m.
-    #[inline(always)]
-    fn least(&mut self, child: Child) -> &Lanes {
-        let node = child / LANES as u32;
-        let place = node as usize % KEPT;
-        if self.nodes[place] != node {
-            self.nodes[place] = node;
-            self.least[place] = self.motions.least_along(self.tree.node(node));
-        }
-        &self.least[place]
-    }
-}
-
-impl Order for Deepest<'_> {
-    #[inline(always)]
-    fn bands(&mut self, opened: &Opened) -> [u32; LANES] {
-        let (eight, one) = match opened.side {
-            Side::Body => (&mut self.body, &mut self.obstacle),
-            Side::Obstacle => (&mut self.obstacle, &mut self.body),
-        };
-        let of_eight = eight.least(opened.first);
-        let of_one = one.least(opened.other).0[opened.other as usize % LANES];
-        let (margin, scale) = (self.margin, 1.0 / self.margin);
-        let mut bands = [0; LANES];
-        for (k, band) in bands.iter_mut().enumerate() {
-            let gap = larger(margin + opened.beyond(k), 0.0);
-            let short = gap + larger(of_one, of_eight.0[k]) - self.target;
-            let signed = signed_band_of(short * scale);
-            let out_of_question = short > 0.0; // false for NaN
-            *band = if out_of_question {
-                OUT_OF_QUESTION
-            } else {
-                signed
-            };
         }
         bands
     }

@@ -12,7 +12,8 @@
 use nalgebra::Vector3;
 
 use super::collect::for_bits;
-use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
+use super::cones::LOOK_AHEAD_TILT;
+use super::facing::{Facing, Pair};
 
 /// An arc is left by less than this, as the sine of an angle, for the tolerance of the cones and for rounding.
 const ARC_TOLERANCE: f64 = 2.0 * LOOK_AHEAD_TILT;

@@ -3,7 +3,8 @@
 //! Both trees are descended together, by distance and by cones of normals: surfaces that do not face each other are left
 //! early. Each vertex and edge belongs to one triangle, so that a pair of features is looked at once.
 
-use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
+use super::cones::LOOK_AHEAD_TILT;
+use super::facing::{Facing, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
     CollisionWorkspace, FacingVolumes, MAX_WITNESSES, Placement, Work, for_facing_triangle_pairs,

@@ -14,21 +14,16 @@
 use nalgebra::{Point3, Vector3};
 
 use super::collect::triangle_of;
+use super::cones::{
+    LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_in_edge_cone, is_in_vertex_cone, outward_of_edge,
+};
+use super::foot::{at_corner, foot_on_side, is_over, on_side, past_end};
 use super::reentrant;
 use super::{Contact, Feature, FeaturePair};
 use crate::collision::Placement;
 use crate::geometry::Mesh;
 use crate::geometry::distance::barycentric;
 
-/// How far outside both normal cones the direction may lie, rad: bodies that rest flat on each other do so to about a
-/// micrometre over their size. A ghost slope of 1e-4 is below anything felt.
-pub(crate) const NORMAL_CONE_TOLERANCE: f64 = 1e-4;
-/// The same, rad, for pairs whose row is true however the body is tilted: a corner over a face, which keeps the face's normal, or on a round
-/// side, and edges and rims that cross, which cannot pass each other without meeting. Their rows are there before the body tilts onto them, so that it rests on both of two edges.
-pub(crate) const LOOK_AHEAD_TILT: f64 = 0.02;
-/// How far outside a face a foot may lie: per gap (rad), it covers the wedges over flat edges and then some; per side, rounding.
-const FOOT_TOLERANCE_PER_GAP: f64 = NORMAL_CONE_TOLERANCE;
-const FOOT_TOLERANCE_PER_SIDE: f64 = 1e-9;
 /// Edges at a smaller angle are parallel, as its sine: their vertices stand for them.
 const PARALLEL_SINE: f64 = 1e-6;
 /// Points nearer than this have no direction, m: some rounding errors of a metre.
@@ -348,93 +343,4 @@ impl Facing<'_> {
             barycentric,
         }
     }
-}
-
-/// Whether the foot of a point lies in the triangle, to tolerance.
-#[inline]
-pub(crate) fn is_over(
-    p: &Point3<f64>,
-    t: &[Point3<f64>; 3],
-    normal: &Vector3<f64>,
-    gap: f64,
-) -> bool {
-    (0..3).all(|k| {
-        let side = t[(k + 1) % 3] - t[k];
-        let inside = normal.cross(&side).dot(&(p - t[k]));
-        inside >= 0.0 || {
-            let length = side.norm();
-            inside >= -length * (FOOT_TOLERANCE_PER_GAP * gap + FOOT_TOLERANCE_PER_SIDE * length)
-        }
-    })
-}
-
-/// How far past the nearer end of a side a place is, in sides; signed along it.
-#[inline]
-fn past_end(at: f64) -> f64 {
-    at - at.clamp(0.0, 1.0)
-}
-
-/// The foot of a point on a side and its fraction there, when it lies on the side.
-#[inline]
-fn foot_on_side(p: &Point3<f64>, t: &[Point3<f64>; 3], side: usize) -> Option<(Point3<f64>, f64)> {
-    let along = t[(side + 1) % 3] - t[side];
-    let fraction = along.dot(&(p - t[side])) / along.norm_squared();
-    (0.0..=1.0)
-        .contains(&fraction)
-        .then(|| (t[side] + along * fraction, fraction))
-}
-
-/// No edge at the vertex rises in `direction` by more than `tolerance`.
-pub(crate) fn is_in_vertex_cone(
-    mesh: &Mesh,
-    v: u32,
-    direction: &Vector3<f64>,
-    tolerance: f64,
-) -> bool {
-    let apex = mesh.vertices()[v as usize];
-    mesh.neighbours(v).iter().all(|w| {
-        let edge = mesh.vertices()[*w as usize] - apex;
-        let rise = direction.dot(&edge);
-        rise <= 0.0 || rise * rise <= tolerance * tolerance * edge.norm_squared()
-    })
-}
-
-/// Neither face at the edge rises in `direction`.
-pub(crate) fn is_in_edge_cone(
-    mesh: &Mesh,
-    edge: u32,
-    direction: &Vector3<f64>,
-    tolerance: f64,
-) -> bool {
-    let edge = &mesh.edges()[edge as usize];
-    let along =
-        mesh.vertices()[edge.vertices[1] as usize] - mesh.vertices()[edge.vertices[0] as usize];
-    let limit = tolerance * tolerance * along.norm_squared();
-    // `normal x along` points into the left face; into the right one it is the other way.
-    [(edge.faces[0], 1.0), (edge.faces[1], -1.0)]
-        .iter()
-        .all(|(face, sign)| {
-            let rise = sign * direction.dot(&mesh.face_normal(*face).cross(&along));
-            rise <= 0.0 || rise * rise <= limit
-        })
-}
-
-/// Sum of the normals at an edge: a direction inside its normal cone.
-#[inline]
-pub(super) fn outward_of_edge(mesh: &Mesh, edge: u32) -> Vector3<f64> {
-    let [left, right] = mesh.edges()[edge as usize].faces;
-    mesh.face_normal(left) + mesh.face_normal(right)
-}
-
-fn at_corner(k: usize) -> [f64; 3] {
-    let mut weights = [0.0; 3];
-    weights[k] = 1.0;
-    weights
-}
-
-fn on_side(side: usize, fraction: f64) -> [f64; 3] {
-    let mut weights = [0.0; 3];
-    weights[side] = 1.0 - fraction;
-    weights[(side + 1) % 3] = fraction;
-    weights
 }

@@ -2,9 +2,11 @@
 
 mod arc;
 mod collect;
+mod cones;
 mod contact;
 mod facing;
 mod feature;
+mod foot;
 mod reduction;
 mod reentrant;
 mod separation;
@@ -20,6 +22,7 @@ pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};
 pub(crate) use violated::{Violated, for_violated};
 
-pub(crate) use facing::{
-    LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_in_edge_cone, is_in_vertex_cone, is_over,
+pub(crate) use cones::{
+    LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_in_edge_cone, is_in_vertex_cone,
 };
+pub(crate) use foot::is_over;

@@ -12,7 +12,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::facing::{NORMAL_CONE_TOLERANCE, is_in_edge_cone, outward_of_edge};
+use super::cones::{NORMAL_CONE_TOLERANCE, is_in_edge_cone, outward_of_edge};
 use crate::geometry::Mesh;
 
 /// Most faces at a vertex that are looked at: beyond, it is no notch.

@@ -4,7 +4,8 @@ use nalgebra::Point3;
 
 use super::Contact;
 use super::collect::{can_touch, for_contacts, in_world};
-use super::facing::{Facing, LOOK_AHEAD_TILT};
+use super::cones::LOOK_AHEAD_TILT;
+use super::facing::Facing;
 use crate::collision::{
     CollisionWorkspace, FacingVolumes, Motions, Placement, Side, Work, for_deepest_triangle_pairs,
 };

@@ -1,7 +1,7 @@
 //! What obstacles that moved in an update have still to carry the body along, where it sticks to them.
 
 use super::GodObject;
-use super::obstacles::PlacedObstacle;
+use super::placed_obstacle::PlacedObstacle;
 use crate::spatial::{Pose, Vector6, pose_difference};
 use crate::surface::Carried;
 use nalgebra::Vector3;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::GodObject;
-use super::obstacles::{Ahead, PlacedObstacle};
+use super::placed_obstacle::{Ahead, PlacedObstacle};
 use crate::collision::Work;
 use crate::constraint::{Contact, MAX_ROWS, NonPenetrationConstraint, Surfaces};
 use crate::shape;

@@ -1,6 +1,6 @@
 //! How far a motion is free of every obstacle: continuous collision detection, obstacle by obstacle.
 
-use super::obstacles::PlacedObstacle;
+use super::placed_obstacle::PlacedObstacle;
 use super::{GodObject, StepReport};
 use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
 use crate::shape;

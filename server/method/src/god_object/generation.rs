@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use arrayvec::ArrayVec;
 
-use super::obstacles::Ahead;
+use super::placed_obstacle::Ahead;
 use super::projection::Projected;
 use super::substep::Update;
 use super::{GodObject, StepReport};

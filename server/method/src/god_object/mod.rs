@@ -24,6 +24,7 @@
 //! | `search.rs`     | rows that are missing, where surfaces conform                                     |
 //! | `look_ahead.rs` | how far a published set looks ahead, and what that may cost                       |
 //! | `obstacles.rs`  | obstacles that move, and the body out of their way                                |
+//! | `placed_obstacle.rs` | where an obstacle is on its way                                              |
 //! | `report.rs`     | what one update did                                                               |
 
 mod candidates;
@@ -33,6 +34,7 @@ mod free_motion;
 mod generation;
 mod look_ahead;
 mod obstacles;
+mod placed_obstacle;
 mod projection;
 mod report;
 mod search;

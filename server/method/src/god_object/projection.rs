@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::obstacles::Ahead;
+use super::placed_obstacle::Ahead;
 use super::{GodObject, StepReport};
 use crate::constraint::contact_jacobian;
 use crate::implicit::{ImplicitAnswer, LinearAnswer};

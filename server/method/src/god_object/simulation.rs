@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::carry::Carry;
 use super::collection::GivenRows;
-use super::obstacles::PlacedObstacle;
+use super::placed_obstacle::PlacedObstacle;
 use super::substep::{StepMemory, Update};
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};

@@ -14,6 +14,8 @@ mod reduction;
 mod rows;
 mod solve;
 mod working_set;
+#[cfg(test)]
+mod working_set_tests;
 
 pub use half_space::HalfSpace;
 pub use kkt::{KktResidual, kkt_residual};

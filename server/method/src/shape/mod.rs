@@ -14,9 +14,12 @@ mod element;
 mod intersection;
 mod piece;
 mod primitive;
+#[cfg(test)]
+mod primitive_tests;
 mod rim;
 mod separation;
 mod time_of_impact;
+mod touching;
 
 pub use intersection::{shape_surfaces_intersect, shapes_intersect};
 pub use primitive::{Nearest, Primitive, PrimitiveError};

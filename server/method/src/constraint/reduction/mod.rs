@@ -27,7 +27,10 @@
 
 mod at;
 mod candidates;
+mod collected;
 mod grow;
+#[cfg(test)]
+mod grow_tests;
 mod neighbours;
 mod row;
 
@@ -35,10 +38,10 @@ use arrayvec::ArrayVec;
 
 pub(crate) use at::{At, Place, Purpose, Surfaces};
 
-use super::{Collected, Contact, FeaturePair, NonPenetrationConstraint, contact_jacobian};
+use super::{Contact, FeaturePair, NonPenetrationConstraint, contact_jacobian};
 use crate::collision::Work;
 use crate::quasi_statics::{HalfSpace, Projector, SolverKind};
-use crate::spatial::{Pose, Vector6, angular, linear};
+use crate::spatial::{Pose, Vector6};
 use crate::world::World;
 use candidates::Candidates;
 use row::{Known, face, felt, jacobian};
@@ -66,12 +69,6 @@ const IDLE_UPDATES_IMPLIED: u32 = 1;
 const TOUCHING_REST_DISTANCES: f64 = 2.0;
 /// A row of a gap up to so many rest distances holds the body, or will soon.
 const NEAR_REST_DISTANCES: f64 = 4.0;
-
-/// Where a collection has every pair up to so many rest distances, no more are searched for. Up to two of them a peg in its hole took two fifths more work in the
-/// median, and its force was the same.
-const COLLECTED_REST_DISTANCES: f64 = 1.5;
-/// A collection reaches for so many times what the last one was complete within, where that was given up.
-const REACH_GROWTH: f64 = 2.0;
 
 /// Finds rows as motions need them.
 #[derive(Debug)]
@@ -225,38 +222,6 @@ impl RowReduction {
         self.outdated
     }
 
-    /// How far the body and the obstacles may have gone since the candidates were collected, m: `radius` bounds the arms of the body's points about G.
-    pub(crate) fn moved(&self, radius: f64) -> f64 {
-        let moved = &self.candidates.moved;
-        let gone = self.gone.iter().copied().fold(0.0, f64::max);
-        linear(moved).norm() + radius * angular(moved).norm() + gone
-    }
-
-    /// Distance within which every pair was a candidate when they were collected, m.
-    pub(crate) fn complete_within(&self) -> f64 {
-        self.candidates.complete_within
-    }
-
-    /// Distance from where they were collected within which motions find their candidates, m: they are known, or searched for.
-    pub(crate) fn served(&self) -> f64 {
-        self.served
-    }
-
-    /// Distance that was asked for when they were collected, m.
-    pub(crate) fn asked(&self) -> f64 {
-        self.asked
-    }
-
-    /// Whether the work did not allow to collect as far as was asked for.
-    pub(crate) fn was_given_up(&self) -> bool {
-        self.complete_within() < self.asked
-    }
-
-    /// Distance within which every pair was a candidate or is known to be farther at the present pose, m: `radius` bounds its points' arms about G.
-    pub(crate) fn known_within(&self, radius: f64) -> f64 {
-        (self.candidates.complete_within - self.moved(radius)).max(0.0)
-    }
-
     /// Smallest gap of the rows that face and of the candidates, m. Infinite when there are none.
     pub(crate) fn gap_min(&mut self, at: &At, work: &mut Work) -> f64 {
         let facing = self.known.iter().filter(|row| !row.implied);
@@ -279,98 +244,6 @@ impl RowReduction {
             least = least.min(exact);
         }
         least
-    }
-
-    /// Forgets the candidates; those of the present pose are to be offered, within a distance asked for, m.
-    pub(crate) fn begin(&mut self, at: &At, asked: f64) {
-        self.asked = asked;
-        self.truncated = false;
-        self.outdated = false;
-        self.gone.fill(0.0);
-        self.candidates.clear(&at.reference);
-        self.served = f64::INFINITY;
-    }
-
-    /// How far the pairs of an obstacle are to be collected of a distance asked for, m: what the work did not allow last time it will hardly allow now.
-    pub(crate) fn reach(&self, obstacle: usize, asked: f64) -> f64 {
-        asked.min(self.next_reach[obstacle])
-    }
-
-    /// Takes note of how far a collection came that was to reach so far of what was asked for, m.
-    pub(crate) fn reached(
-        &mut self,
-        at: &At,
-        obstacle: usize,
-        [reach, asked]: [f64; 2],
-        within: f64,
-    ) {
-        let whole = within >= reach && reach >= asked; // false for NaN
-        self.next_reach[obstacle] = if whole {
-            f64::INFINITY
-        } else {
-            REACH_GROWTH * within.max(at.rest_distance)
-        };
-    }
-
-    /// Adds contacts of one obstacle at the present pose to choose from, world frame, complete within a distance (m).
-    pub(crate) fn offer(
-        &mut self,
-        at: &At,
-        obstacle: usize,
-        contacts: &[Contact],
-        collected: &Collected,
-    ) {
-        let room = self.candidates.room();
-        for contact in contacts.iter().take(room) {
-            self.candidates
-                .push(contact, &jacobian(contact, &at.center()));
-        }
-        let mut within = collected.complete_within;
-        if contacts.len() > room {
-            within = within.min(contacts[room].gap);
-        }
-        let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
-        self.truncated |= within < touching.min(self.asked);
-        self.candidates.complete_within = self.candidates.complete_within.min(within);
-        let searched = if self.conforms(at, obstacle) {
-            COLLECTED_REST_DISTANCES * at.rest_distance
-        } else {
-            0.0
-        };
-        self.served = self.served.min(within.max(searched));
-    }
-
-    /// Adds a contact of the present pose to choose from where one of the motions violates it, world frame; whether it does.
-    pub(crate) fn offer_violated(
-        &mut self,
-        (at, surfaces): (&At, &dyn Surfaces),
-        motions: &[Vector6],
-        purpose: Purpose,
-        contact: &Contact,
-    ) -> bool {
-        let row = Known::of(contact, surfaces, &at.center());
-        let (jacobian, nearer) = row.for_purpose(purpose);
-        let gap = contact.gap.max(purpose.least_gap(at)) - nearer;
-        let violated = |motion: &Vector6| {
-            let violation = at.rest_distance - gap - jacobian.dot(motion);
-            violation > at.tolerance // false for NaN
-        };
-        if !motions.iter().any(violated) || self.knows(&contact.features) {
-            return false;
-        }
-        if self.candidates.room() == 0 {
-            self.truncated = true;
-            return false;
-        }
-        self.candidates
-            .push_at(contact, &row.jacobian, &row.felt, nearer);
-        true
-    }
-
-    /// Whether the last collection of an obstacle was given up before it had every pair that touches: what motions violate is searched for there.
-    pub(crate) fn conforms(&self, at: &At, obstacle: usize) -> bool {
-        let collected = COLLECTED_REST_DISTANCES * at.rest_distance;
-        self.next_reach[obstacle] < REACH_GROWTH * collected
     }
 
     fn knows(&self, features: &FeaturePair) -> bool {
