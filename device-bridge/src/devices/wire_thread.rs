@@ -141,6 +141,12 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
         knows.then_some(wanted.command)
     }
 
+    /// Whether what was commanded last is too old to be written at `now`: the driver's thread has stalled since it took it.
+    pub(crate) fn is_late(&self, now: Duration) -> bool {
+        self.called
+            .is_some_and(|called| now.saturating_sub(called) > HOLDS)
+    }
+
     /// The device has had zero for a while, whatever was commanded: the next command is none, and the port begins at zero.
     pub(crate) fn missed(&mut self) {
         self.called = Some(Duration::ZERO);
@@ -445,6 +451,19 @@ mod tests {
         assert!(port.let_go());
         port.command(0.5);
         says(&mut line, &[(143, Some(0.5))]);
+    }
+
+    #[test]
+    fn a_command_that_a_stalled_driver_took_long_ago_is_not_written() {
+        let (mut port, mut line) = WireThread::<u32, f64>::ends("a wire".to_owned());
+        assert!(!line.is_late(ms(50)), "nothing was taken");
+        port.command(2.0);
+        says(&mut line, &[(100, Some(2.0))]);
+        assert!(!line.is_late(ms(120)) && line.is_late(ms(121)));
+        line.missed();
+        port.command(2.0);
+        says(&mut line, &[(122, None)]);
+        assert!(port.let_go());
     }
 
     #[test]

@@ -167,7 +167,13 @@ impl Talker {
             ticker.wait();
             drain(socket)?;
             let command = line.command_if(monotonic_now(), exchange.unusable().is_none());
-            send(socket, exchange.say(command))?;
+            let mut message = exchange.say(command);
+            if line.is_late(monotonic_now()) {
+                // Made for a hand that feels the last one: the device has let go meanwhile.
+                line.missed();
+                message = exchange.say(Some([0.0; 3]));
+            }
+            send(socket, message)?;
             let answer = answer(socket, exchange, line)?;
             match exchange.hear(&answer) {
                 Ok(()) => nonsense = 0,

@@ -42,11 +42,18 @@ pub fn ms(time: u64) -> Duration {
 }
 
 pub fn opened(choice: &str) -> Result<Box<dyn Device>, String> {
+    opened_with(choice, 0)
+}
+
+/// `priority` asks for real time for the driver's thread; 0 does not.
+fn opened_with(choice: &str, priority: u8) -> Result<Box<dyn Device>, String> {
     let DeviceChoice::Input(input) = choice.parse().map_err(|e| format!("{e}"))? else {
         panic!("it is opened");
     };
     let placement = Placement::plain(Pose::identity(), Point3::origin());
-    input.open(placement, 0).map_err(|error| error.to_string())
+    input
+        .open(placement, priority)
+        .map_err(|error| error.to_string())
 }
 
 /// A port around the device, on a clock that goes a millisecond by tick, however long that takes.
@@ -69,11 +76,15 @@ pub struct Stage {
 
 impl Stage {
     pub fn new(choice: &str, rearm: Rearm) -> Self {
+        Self::with_driver(choice, rearm, 0)
+    }
+
+    fn with_driver(choice: &str, rearm: Rearm, priority: u8) -> Self {
         let settings = SafetySettings {
             rearm,
             ..SafetySettings::default()
         };
-        let device = opened(choice).unwrap_or_else(|error| panic!("{error}"));
+        let device = opened_with(choice, priority).unwrap_or_else(|error| panic!("{error}"));
         let mut port = DevicePort::new(device, settings, Point3::origin(), &Pose::identity());
         port.restart(CommandSource::Same);
         Self {
@@ -274,11 +285,15 @@ pub const BAD_SAMPLES: Faults = Faults {
     patience: PATIENCE,
 };
 
+/// Real time for a driver, as `taut bridge` asks for it: a driver that stands for 50 ms between taking a command and writing it writes for a hand that
+/// feels nothing any more, which no driver can help.
+const DRIVER_PRIORITY: u8 = 80;
+
 /// What the port promises of every write holds at the device: samples that are bad for a moment or for long make no jump there, and neither does
 /// the way back after the driver itself has let go.
 pub fn no_write_jumps(choice: &str, inside: &dyn Inside, faults: &Faults) {
     let allowed = faults.allowed;
-    let mut stage = Stage::new(choice, Rearm::Automatic);
+    let mut stage = Stage::with_driver(choice, Rearm::Automatic, DRIVER_PRIORITY);
     stage.floor = (faults.floor, 1000.0);
     stage.rounded = (allowed - SLEW) / 2;
     for &mode in faults.modes {
