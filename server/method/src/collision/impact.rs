@@ -22,7 +22,7 @@ pub enum TimeOfImpact {
     },
 }
 
-/// Tolerances and limits of [`time_of_impact`].
+/// Tolerances and limits of [`time_of_impact`](super::time_of_impact()).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdvancementSettings {
     /// Gap at which surfaces count as touching, m. They never come nearer, unless they are nearer at the start: then
