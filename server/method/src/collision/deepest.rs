@@ -10,9 +10,11 @@ use super::work::Work;
 use crate::geometry::lanes::{LANES, Lanes};
 use crate::geometry::wide_tree::{Child, WideTree};
 
-/// Nodes of each tree whose motions are kept.
+/// Nodes of each tree of which it is kept what the motions do there.
 const KEPT: usize = 32;
+/// Marks a place where none is kept.
 const NO_NODE: u32 = u32::MAX;
+
 /// The band of a signed share: what is deepest comes first, what is farthest last. Without branches, as [`band_of`].
 #[inline(always)]
 fn signed_band_of(share: f32) -> u32 {
@@ -25,8 +27,9 @@ fn signed_band_of(share: f32) -> u32 {
     }
 }
 
-/// The same by how far motions leave the pairs apart, deepest first: for pairs that some motion may bring below `target`, m. The motions are given as
-/// the body and as the obstacle sees them. Stops when `visit` returns false, and where there is no room.
+/// Calls `visit` for the pairs of triangles, (body, obstacle), within `margin`, m, that some of the motions may bring below `target`, m: those first that
+/// end up deepest, to a band. The motions are given as the body and as the obstacle sees them. Stops when `visit` returns false, and where there is no
+/// room for pairs of volumes that wait.
 pub(crate) fn for_deepest_triangle_pairs(
     trees: (&WideTree, &WideTree),
     (volumes, margin): (&FacingVolumes, f64),

@@ -95,7 +95,8 @@ impl Halving<'_> {
             .get(number, self.problem.relative, self.trees, turned)
     }
 
-    /// Halves the interval of a pair until the path of its volumes is straight in it: the half without a part of the window is left out; of two, the later one waits.
+    /// Halves the interval of a pair until the path of its volumes is nearly straight there. The half in which they cannot meet is left out; of two in
+    /// which they may, the later one waits.
     #[inline(always)]
     fn straighten(
         &mut self,
