@@ -311,7 +311,7 @@ fn write_scene(
                     None => middle - start,
                 };
                 let size = around(placed).map_or(0.0, |(low, high)| (high - low).max());
-                if let Some(path) = hand_path(&built, &way, size) {
+                if let Some(path) = hand_path(built, &way, size) {
                     folder.write(HAND_FILE, path.text.as_bytes())?;
                     folder.write(SCENE_FILE, (text + HAND_SECTION).as_bytes())?;
                     notes.push(hand_note(path.meets));
