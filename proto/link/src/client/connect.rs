@@ -11,7 +11,8 @@ use super::{
 use crate::{
     DEFAULT_QUIC_PORT, LinkError, binding,
     framing::{
-        CLOSE_REFUSED, ReadMessageError, close_text, peer_text, read_message, write_message,
+        CLOSE_BYE, CLOSE_REFUSED, ReadMessageError, close_text, peer_text, read_message,
+        write_message,
     },
     pinning::PinnedServer,
     transport,
@@ -65,32 +66,24 @@ pub(crate) async fn connect_with(
         .await
         .map_err(|_| unreachable())??;
     let turned_away = AtomicBool::new(false);
-    let (endpoint, connection) = timeout_at(deadline, reach(&options, &addresses, &turned_away))
-        .await
-        .map_err(|_| match turned_away.load(Ordering::Relaxed) {
-            true => LinkError::TurnedAway {
-                server: options.server.clone(),
-                seconds: options.connect_timeout.as_secs_f64(),
-            },
-            false => unreachable(),
-        })??;
-
-    let joining = timeout_at(deadline, join(&options, &connection));
+    let joining = timeout_at(deadline, get_in(&options, &addresses, &turned_away));
+    let (endpoint, connection, joined) =
+        joining
+            .await
+            .map_err(|_| match turned_away.load(Ordering::Relaxed) {
+                true => LinkError::TurnedAway {
+                    server: options.server.clone(),
+                    seconds: options.connect_timeout.as_secs_f64(),
+                },
+                false => unreachable(),
+            })??;
     let Joined {
         welcome,
         description,
         coupling,
         send,
         recv,
-    } = match joining.await {
-        Ok(Ok(joined)) => joined,
-        Ok(Err(error)) => {
-            connection.close(CLOSE_REFUSED, b"not joined");
-            endpoint.wait_idle().await; // ends with the connection's closing handshake, at most three round trips
-            return Err(error);
-        }
-        Err(_) => return Err(unreachable()),
-    };
+    } = joined;
     let (sealer, opener) =
         binding::client_keys(&connection, welcome.version, welcome.epoch, welcome.session)?;
     let path = match options.transport {
@@ -168,6 +161,44 @@ async fn resolve(server: &str) -> Result<Vec<SocketAddr>, LinkError> {
     }
     addresses.sort_by_key(SocketAddr::is_ipv6);
     Ok(addresses)
+}
+
+/// Reaches the server and joins. Where it ends the connection without an answer, as it does when others come in between, that is no other thing than not
+/// to be let in to begin with: tried again. The caller sets the deadline.
+async fn get_in(
+    options: &ClientOptions,
+    addresses: &[SocketAddr],
+    turned_away: &AtomicBool,
+) -> Result<(Endpoint, Connection, Joined), LinkError> {
+    loop {
+        let attempt = Instant::now();
+        let (endpoint, connection) = reach(options, addresses, turned_away).await?;
+        match join(options, &connection).await {
+            Ok(joined) => return Ok((endpoint, connection, joined)),
+            Err(_) if is_unanswered(&connection) => {
+                turned_away.store(true, Ordering::Relaxed);
+                sleep_until(attempt + RETRY_PERIOD).await;
+            }
+            Err(error) => {
+                connection.close(CLOSE_REFUSED, b"not joined");
+                endpoint.wait_idle().await; // ends with the connection's closing handshake, at most three round trips
+                return Err(error);
+            }
+        }
+    }
+}
+
+/// Whether the connection is over and the server has not said why.
+fn is_unanswered(connection: &Connection) -> bool {
+    connection
+        .close_reason()
+        .is_some_and(|reason| match reason {
+            ConnectionError::ApplicationClosed(close) => close.error_code == CLOSE_BYE,
+            ConnectionError::ConnectionClosed(_)
+            | ConnectionError::TimedOut
+            | ConnectionError::Reset => true,
+            _ => false,
+        })
 }
 
 /// Tries the addresses in turn, again and again; the caller sets the deadline. A server that just starts is reached too.
@@ -376,5 +407,63 @@ fn protocol(options: &ClientOptions, reason: String) -> LinkError {
     LinkError::Protocol {
         server: options.server.clone(),
         reason,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taut_proto::{ClusterKey, Role};
+
+    /// Ends the first connections without a word, before or after the handshake, and answers the next one.
+    async fn answers_at_last(endpoint: Endpoint, silent: usize) -> Option<()> {
+        for number in 0.. {
+            let incoming = endpoint.accept().await?;
+            if number < silent && number % 2 == 0 {
+                let connecting = incoming.accept().ok()?;
+                drop(connecting);
+                continue;
+            }
+            let connection = incoming.await.ok()?;
+            let (mut send, mut recv) = connection.accept_bi().await.ok()?;
+            if number < silent {
+                continue;
+            }
+            let hello = read_message(&mut recv, 1024, VersionRange::SUPPORTED).await;
+            assert!(matches!(hello, Ok(ControlMessage::Hello(_))), "{hello:?}");
+            let version = VersionRange::SUPPORTED.max();
+            let refusal = ControlMessage::Refused(Refusal {
+                code: RefusalCode::Full,
+                version,
+                text: "no room".into(),
+            });
+            write_message(&mut send, &refusal, version).await.ok()?;
+            connection.closed().await;
+            return Some(());
+        }
+        None
+    }
+
+    #[tokio::test]
+    async fn a_connection_that_ends_without_an_answer_is_no_answer() {
+        let key = ClusterKey::generate().expect("a key");
+        let config = transport::server_config(&key, None, Duration::from_secs(10));
+        let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let endpoint = Endpoint::server(config.expect("a key"), any).expect("a port");
+        let address = endpoint.local_addr().expect("bound").to_string();
+        let server = tokio::spawn(answers_at_last(endpoint, 4));
+        let mut options = ClientOptions::new(address, key, Role::Observer, "watcher");
+        (options.connect_timeout, options.idle_timeout) =
+            (Duration::from_secs(60), Duration::from_secs(10));
+        let answer = connect(options).await.map(|_| ());
+        let refused = matches!(
+            answer,
+            Err(LinkError::Refused {
+                code: RefusalCode::Full,
+                ..
+            })
+        );
+        assert!(refused, "{answer:?}");
+        assert_eq!(server.await.expect("no panic"), Some(()));
     }
 }
