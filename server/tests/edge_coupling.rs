@@ -16,6 +16,7 @@ use taut::session::setup::DeviceSource;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::{BridgeArgs, BridgeReport, DeviceLimits, MAX_EDGE_DELAY};
 use taut_link::{ClientOptions, Role, connect, create_key_file};
+use taut_proto::state::RunState;
 use taut_test_kit::BALL_ON_FLOOR;
 
 const STIFFNESS: f64 = 1000.0;
@@ -26,7 +27,7 @@ const REST_DISTANCE: f64 = 4e-6;
 /// The hand presses for a second, slides, and goes on up and down.
 const PATH: &str = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.04,1,0,0,0\n0.8,0,0,0.012,1,0,0,0\n1.3,0.05,0,0.012,1,0,0,0\n1.6,0.05,0,0.016,1,0,0,0\n1.9,0.05,0,0.01,1,0,0,0\n2.2,0,0,0.016,1,0,0,0\n2.6,0,0,0.012,1,0,0,0\n3.5,0,0,0.012,1,0,0,0\n";
 const DURATION_S: f64 = 3.5;
-/// The force ramps in during this time after the start, s of session time after the first sample.
+/// The force ramps in during this time after the server began to give force, of session time.
 const RAMPED_IN: Duration = Duration::from_millis(900);
 
 /// A pause of any thread that, with others', a watchdog of 20 ms may take for silence: the machine's doing, not the network's.
@@ -44,6 +45,8 @@ struct Cli {
 struct Run {
     /// Force error against the closed form, N, and the closed form, for every state that came.
     errors: Vec<(f64, f64)>,
+    /// The server has taken the force away in between.
+    interrupted: bool,
     report: BridgeReport,
     lost_down: u64,
     stalled: bool,
@@ -112,7 +115,7 @@ fn run(coupling: &str) -> Run {
         .name("bridge".to_owned())
         .spawn(move || taut_bridge::run(&args))
         .expect("a thread");
-    let errors = observe(&server, &key_path, || bridge.is_finished());
+    let (errors, interrupted) = observe(&server, &key_path, || bridge.is_finished());
     let report = bridge
         .join()
         .expect("no panic")
@@ -126,6 +129,7 @@ fn run(coupling: &str) -> Run {
     let slowest = slowest.max(canary.join().expect("no panic"));
     Run {
         errors,
+        interrupted,
         stalled: slowest > STALL_US || of_session.haptics_period_us.max > STALL_US as f64,
         report,
         lost_down,
@@ -150,8 +154,9 @@ fn canary() -> (JoinHandle<u64>, Arc<AtomicBool>) {
     (thread.expect("a thread"), awake)
 }
 
-/// Force and device pose as the server tells them, until the bridge has ended. Over QUIC, past the relay: what is seen is what the bridge sent.
-fn observe(server: &str, key: &Path, ended: impl Fn() -> bool) -> Vec<(f64, f64)> {
+/// Force and device pose as the server tells them, until the bridge has ended, and whether the server stopped giving force before. Over QUIC, past the
+/// relay: what is seen is what the bridge sent.
+fn observe(server: &str, key: &Path, ended: impl Fn() -> bool) -> (Vec<(f64, f64)>, bool) {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .enable_all()
@@ -163,6 +168,7 @@ fn observe(server: &str, key: &Path, ended: impl Fn() -> bool) -> Vec<(f64, f64)
     let link = runtime.block_on(connect(options)).expect("joined");
     let begun = Instant::now();
     let (mut states, mut errors, mut first) = (Vec::new(), Vec::new(), None);
+    let (mut running, mut interrupted) = (false, false);
     while !ended() {
         assert!(begun.elapsed() < PATIENCE, "the bridge does not end");
         std::thread::sleep(Duration::from_millis(5));
@@ -173,10 +179,13 @@ fn observe(server: &str, key: &Path, ended: impl Fn() -> bool) -> Vec<(f64, f64)
             let Some(tool) = state.tools.first() else {
                 continue;
             };
-            let fresh = state.run == taut_proto::state::RunState::Running;
-            if !fresh {
+            let was_running = running;
+            running = state.run == RunState::Running;
+            if !running {
+                first = None;
                 continue;
             }
+            interrupted |= !was_running && !errors.is_empty();
             let since = *first.get_or_insert(state.sample_time_ns);
             let elapsed = Duration::from_nanos(state.sample_time_ns.saturating_sub(since));
             let ramped = elapsed > RAMPED_IN;
@@ -188,7 +197,7 @@ fn observe(server: &str, key: &Path, ended: impl Fn() -> bool) -> Vec<(f64, f64)
             }
         }
     }
-    errors
+    (errors, interrupted)
 }
 
 /// The error below which a share of the states is, N.
@@ -199,9 +208,9 @@ fn quantile(run: &Run, share: f64) -> f64 {
     errors.get(place).copied().unwrap_or(f64::INFINITY)
 }
 
-/// Whether no watchdog let the force fade, and the bridge had joined soon enough to be watched; else the machine must have paused a thread.
+/// Whether no watchdog of either end let the force fade, and the bridge had joined soon enough to be watched; else the machine must have paused a thread.
 fn is_whole(run: &Run) -> bool {
-    let whole = run.report.safety_events == 0 && run.errors.len() > 500;
+    let whole = run.report.safety_events == 0 && !run.interrupted && run.errors.len() > 500;
     assert!(whole || run.stalled, "{}", run.report);
     whole
 }

@@ -23,8 +23,8 @@ use crate::port::SafetySettings;
 /// Age of the newest reading from which on the device counts as lost.
 pub const DEFAULT_MAX_AGE: Duration = Duration::from_millis(20);
 
-/// The same for a bridge which couples by itself: no force waits for the reading, but the constraint set that answers an older one is of no
-/// use to it.
+/// The same for a bridge which couples by itself: no force waits for the reading, the bridge counts the age of its sets by itself, and one that answers
+/// an older reading is of no use to it.
 pub const MAX_EDGE_DELAY: Duration = SafetySettings::ZERO_AFTER;
 
 /// How far the clocks of network and loops, which are one, may read apart: their zeros are taken one after the other.
@@ -62,8 +62,8 @@ impl RemoteDevice {
     /// The device behind `inputs` ([`taut_link::ServerLink::device_inputs`]) and the commands for the broadcast thread
     /// to send ([`taut_link::Broadcaster::send_wrench`]), newest each time it looks.
     ///
-    /// `limits` are those of the device that the workbench expects there; `max_age` is the silence after
-    /// which it counts as lost ([`DEFAULT_MAX_AGE`] fits a local network).
+    /// `limits` are those of the device that the workbench expects there; `max_age` is the age and the silence after
+    /// which it counts as lost ([`DEFAULT_MAX_AGE`] fits a local network); a bridge that couples by itself has at least [`MAX_EDGE_DELAY`].
     #[must_use]
     pub fn new(
         inputs: triple_buffer::Output<Option<DeviceInput>>,
@@ -133,11 +133,11 @@ impl RemoteDevice {
             .saturating_add(uncertainty);
         let silence = now.saturating_sub(received);
         let allowed = if at_edge {
-            MAX_EDGE_DELAY
+            MAX_EDGE_DELAY.max(self.max_age)
         } else {
             self.max_age
         };
-        if age > allowed || silence > self.max_age {
+        if age.max(silence) > allowed {
             return Err(DeviceFault::Lost { age });
         }
         if input.sample.flags & INPUT_FAULT != 0 {
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bridge_that_couples_by_itself_may_be_far_away_but_not_silent() {
+    fn a_bridge_that_couples_by_itself_may_be_far_away_or_silent_for_120_ms() {
         let (mut inputs, mut device, mut commands) = device();
         let mut edge = input(900, 1000);
         edge.sample.flags = INPUT_AT_EDGE;
@@ -353,9 +353,14 @@ mod tests {
         );
         device.write(ms(1000), &Vector6::repeat(1.0));
         assert_eq!(commands.read().flags, WRENCH_AT_EDGE);
-        assert!(device.read(ms(1021)).is_err(), "21 ms of silence");
+        assert!(device.read(ms(1020)).is_ok(), "120 ms old");
+        assert!(device.read(ms(1021)).is_err(), "121 ms old");
         device.write(ms(1021), &Vector6::repeat(1.0));
         assert_eq!(commands.read().flags, 0, "no sets for a lost bridge");
+        edge.sample.sample_time_ns = 1_000_000_000;
+        inputs.write(Some(edge));
+        assert!(device.read(ms(1120)).is_ok(), "120 ms of silence");
+        assert!(device.read(ms(1121)).is_err(), "121 ms of silence");
         edge.sample.sample_time_ns = 1;
         inputs.write(Some(edge));
         assert!(device.read(ms(1000)).is_err(), "a second on the way");

@@ -268,7 +268,9 @@ impl DevicePort {
         let verdict = match self.check.judge(now, reading) {
             // A driver that gives its last sample for ever has lost its device too.
             Verdict::Same => match self.last_good.map(|seen| now.saturating_sub(seen)) {
-                Some(age) if age > self.settings.hold => Verdict::Bad(DeviceFault::Lost { age }),
+                Some(age) if age > self.settings.longest_silence() => {
+                    Verdict::Bad(DeviceFault::Lost { age })
+                }
                 _ => Verdict::Same,
             },
             verdict => verdict,

@@ -126,6 +126,12 @@ impl SafetySettings {
         self
     }
 
+    /// Longest time without a new sample: over a network samples may be as far apart as they may be old, and it is the device that says when that is too
+    /// long.
+    pub(super) fn longest_silence(&self) -> Duration {
+        self.hold.max(self.validation.time_slack)
+    }
+
     /// Age of the newest input from which on the last force is said to be held: longer than any gap of a loop that works.
     pub(super) fn late(&self) -> Duration {
         LATE.max(2 * self.period)

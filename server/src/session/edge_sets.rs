@@ -4,7 +4,7 @@
 //! tick, so that a large set takes several and the next one is then the newest. A set of many datagrams would seldom arrive whole
 //! on a network that loses one in twenty: from `REPEATED_FROM` on, all are sent twice, in turn.
 //!
-//! **None is sent** when the god-object loop has not renewed it for `OLDEST`, or when the hand is not heard: then the bridge
+//! **None is sent** when the god-object loop has not renewed it for `OLDEST`, or when the hand was not heard for 120 ms: then the bridge
 //! hears nothing and lets its force fade, as it does when the network breaks.
 
 use std::time::Duration;

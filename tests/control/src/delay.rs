@@ -5,6 +5,7 @@
 //! checked against the virtual clock, which it does not know.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -265,29 +266,43 @@ pub fn run_with(
     outcome
 }
 
-/// What is felt in each of `ticks` milliseconds, N, where an operator of the server wishes this; without delay, and without
-/// control of energy, whose reserve is less than what a light hand is pushed back by.
+/// What befalls a run.
+#[derive(Clone, Debug, Default)]
+pub struct Befalls {
+    /// How long everything is on its way, ms, beside 0.3 ms.
+    pub delay_ms: f64,
+    /// What an operator of the server wishes, and in which millisecond.
+    pub wishes: Vec<(u32, ArmWish)>,
+    /// Milliseconds in which all that leaves the bridge is lost, and all that leaves the server.
+    pub lost: [Range<u32>; 2],
+}
+
+/// What is felt in each of `ticks` milliseconds, N; without control of energy, whose reserve is less than what a light hand is pushed back by.
 ///
 /// # Panics
 /// When the scene of the task is none.
 #[must_use]
 pub fn felt_under(
-    wishes: &[(u32, ArmWish)],
+    befalls: &Befalls,
     rubbing: &Rubbing,
     mode: Mode,
     ticks: u32,
 ) -> (Vec<f64>, Vec<EventKind>) {
-    let near = Impairment::new(0.3, 0.0);
+    let near = Impairment::new(0.3 + befalls.delay_ms, 0.0);
     let (mut up, mut down) = (Way::new(near, 11), Way::new(near, 12));
+    let mut nowhere = Way::new(near, 13);
     let mut server = Server::new(&rubbing.task);
     let mut bridge = Bridge::new(rubbing, mode, Passivity::Observe);
     let (mut felt, mut events) = (Vec::new(), Vec::new());
     for tick in 1..=ticks {
-        let wished = wishes.iter().filter(|(at, _)| *at == tick);
+        let wished = befalls.wishes.iter().filter(|(at, _)| *at == tick);
         wished.for_each(|(_, wish)| server.loops.arm_switch.wish(*wish));
         let now = TICK * tick;
-        felt.push(bridge.tick(tick, now, &mut down, &mut up, &mut events));
-        server.tick(now, &mut up, &mut down);
+        let lost = [0, 1].map(|way| befalls.lost[way].contains(&tick));
+        let to_server = if lost[0] { &mut nowhere } else { &mut up };
+        felt.push(bridge.tick(tick, now, &mut down, to_server, &mut events));
+        let to_bridge = if lost[1] { &mut nowhere } else { &mut down };
+        server.tick(now, &mut up, to_bridge);
     }
     (felt, events)
 }

@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use taut_bridge::{ArmWish, EventKind, Passivity};
-use taut_control_tests::delay::{Course, Growth, Rubbing, ZERO_AFTER, felt_under, run, run_with};
+use taut_control_tests::delay::{
+    Befalls, Course, Growth, Rubbing, ZERO_AFTER, felt_under, run, run_with,
+};
 use taut_control_tests::edge::Mode;
 use taut_control_tests::edge_scenes::Task;
 
@@ -117,9 +119,12 @@ fn keeps_its_promise_at_any_slope(name: &str, rubbing: &Rubbing, begins_ms: &[u6
 fn who_disarms_and_arms_at_the_server_leads_the_force_down_and_up_wherever_it_is_computed() {
     const OFF: u32 = 3000;
     const ON: u32 = 5000;
-    let wishes = [(OFF, ArmWish::Disarm), (ON, ArmWish::Arm)];
+    let befalls = Befalls {
+        wishes: vec![(OFF, ArmWish::Disarm), (ON, ArmWish::Arm)],
+        ..Befalls::default()
+    };
     for mode in [Mode::Edge, Mode::Shipped] {
-        let (felt, events) = felt_under(&wishes, &Rubbing::pressing_on_wall(), mode, 9000);
+        let (felt, events) = felt_under(&befalls, &Rubbing::pressing_on_wall(), mode, 9000);
         let at = |tick: u32| felt[tick as usize];
         let full = at(OFF);
         assert!(full > 1.0, "{full} N");
@@ -138,6 +143,43 @@ fn who_disarms_and_arms_at_the_server_leads_the_force_down_and_up_wherever_it_is
         assert!(step < 0.2, "{}: {step} N at once", mode.name());
         let fault = events.iter().find(|event| event.is_warning());
         assert_eq!(fault, None, "{}: nothing is wrong", mode.name());
+    }
+}
+
+/// Least and most that is felt after 2 s of pressing, as shares of what it was, where nothing comes through for some milliseconds.
+fn felt_through(delay_ms: f64, ways: [bool; 2], lost_ms: u32) -> ([f64; 2], Vec<EventKind>) {
+    const BEGIN: u32 = 2000;
+    let befalls = Befalls {
+        delay_ms,
+        lost: ways.map(|lost| BEGIN..BEGIN + if lost { lost_ms } else { 0 }),
+        ..Befalls::default()
+    };
+    let (felt, events) = felt_under(&befalls, &Rubbing::pressing_on_wall(), Mode::Edge, 3000);
+    let full = felt[BEGIN as usize - 1];
+    assert!(full > 1.0, "{full} N");
+    let after = felt[BEGIN as usize..].iter().map(|force| force / full);
+    let bounds = after.fold([f64::INFINITY, 0.0_f64], |[least, most], share| {
+        [least.min(share), most.max(share)]
+    });
+    (bounds, events)
+}
+
+#[test]
+fn a_network_that_is_silent_for_a_moment_takes_no_force_from_an_edge() {
+    // A set is good for 75 ms after the reading that it answers; some milliseconds are ticks on the way.
+    for delay_ms in [0.0, 5.0, 15.0, 25.0] {
+        let left = 65 - (2.0 * delay_ms) as u32;
+        for ways in [[true, false], [false, true], [true, true]] {
+            for lost_ms in [5, 21, 35, left] {
+                let lost_ms = lost_ms.min(left);
+                let ([least, most], events) = felt_through(delay_ms, ways, lost_ms);
+                let case = format!("{delay_ms} ms {ways:?} {lost_ms} ms: {events:?}");
+                assert!(least > 0.99 && most < 1.01, "{least} to {most}, {case}");
+                assert!(events.iter().all(|event| event.is_good_news()), "{case}");
+            }
+            let ([least, _], events) = felt_through(delay_ms, ways, 150);
+            assert_eq!(least, 0.0, "{delay_ms} ms {ways:?}: {events:?}");
+        }
     }
 }
 
