@@ -240,7 +240,10 @@ fn a_server_that_stays_lost_is_an_error_that_names_it() {
     let mut args = server.args("both");
     args.membership.give_up = Some(1.0);
     let node = start(args);
-    wait_for("a client", || !server.link.clients().is_empty());
+    // It is in by its own reckoning, too: before, nothing would be lost.
+    wait_for("a report", || {
+        server.link.clients().iter().any(|of| of.stats.is_some())
+    });
     // All its threads stop at once, as if its machine had lost power.
     let Server {
         runtime,

@@ -175,8 +175,7 @@ async fn get_in(
         let (endpoint, connection) = reach(options, addresses, turned_away).await?;
         match join(options, &connection).await {
             Ok(joined) => return Ok((endpoint, connection, joined)),
-            Err(_) if is_unanswered(&connection) => {
-                turned_away.store(true, Ordering::Relaxed);
+            Err(_) if is_unanswered(&connection, turned_away) => {
                 sleep_until(attempt + RETRY_PERIOD).await;
             }
             Err(error) => {
@@ -188,17 +187,16 @@ async fn get_in(
     }
 }
 
-/// Whether the connection is over and the server has not said why.
-fn is_unanswered(connection: &Connection) -> bool {
-    connection
-        .close_reason()
-        .is_some_and(|reason| match reason {
-            ConnectionError::ApplicationClosed(close) => close.error_code == CLOSE_BYE,
-            ConnectionError::ConnectionClosed(_)
-            | ConnectionError::TimedOut
-            | ConnectionError::Reset => true,
-            _ => false,
-        })
+/// Whether the connection is over and nobody has said why; notes where it is the server that ended it.
+fn is_unanswered(connection: &Connection, turned_away: &AtomicBool) -> bool {
+    let by_server = match connection.close_reason() {
+        Some(ConnectionError::ApplicationClosed(close)) if close.error_code == CLOSE_BYE => true,
+        Some(ConnectionError::ConnectionClosed(_)) => true,
+        Some(ConnectionError::TimedOut | ConnectionError::Reset) => false,
+        _ => return false,
+    };
+    turned_away.fetch_or(by_server, Ordering::Relaxed);
+    true
 }
 
 /// Tries the addresses in turn, again and again; the caller sets the deadline. A server that just starts is reached too.
@@ -442,6 +440,39 @@ mod tests {
             return Some(());
         }
         None
+    }
+
+    #[tokio::test]
+    async fn a_server_that_dies_while_a_node_joins_is_not_there_and_turns_nobody_away() {
+        let key = ClusterKey::generate().expect("a key");
+        let config = transport::server_config(&key, None, Duration::from_secs(10));
+        let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let (reached, died) = tokio::sync::oneshot::channel();
+        // A runtime of its own, so that all of it stops at once.
+        let machine = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .expect("a runtime");
+        let endpoint = {
+            let _within = machine.enter();
+            Endpoint::server(config.expect("a key"), any).expect("a port")
+        };
+        let address = endpoint.local_addr().expect("bound").to_string();
+        machine.spawn(async move {
+            let connection = endpoint.accept().await.expect("a node").await;
+            let _ = reached.send(());
+            std::future::pending::<()>().await;
+            drop(connection);
+        });
+        let mut options = ClientOptions::new(address, key, Role::Observer, "watcher");
+        (options.connect_timeout, options.idle_timeout) =
+            (Duration::from_secs(3), Duration::from_secs(1));
+        let node = tokio::spawn(connect(options));
+        died.await.expect("reached");
+        machine.shutdown_background();
+        let error = node.await.expect("no panic").map(|_| ()).expect_err("dead");
+        assert!(matches!(error, LinkError::Unreachable { .. }), "{error}");
     }
 
     #[tokio::test]
