@@ -285,6 +285,21 @@ fn bridge_tracker_and_recorder_tell_the_service_manager_that_they_live() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn metrics_that_find_no_room_are_told_of_once_and_end_nothing() {
+    let place = Workplace::new();
+    let options = ["--metrics-json", "/dev/full", "--metrics-period", "0.05"];
+    let mut server = serve(&place, &options, &[]);
+    let said = follow_errors(&mut server);
+    wait_until("the loss is told", || says(&said, "lines are lost"));
+    // Some periods later it is there and has said no more of it.
+    std::thread::sleep(Duration::from_millis(500));
+    end(server);
+    let said = said.lock().expect("no panic");
+    assert_eq!(said.matches("/dev/full").count(), 1, "{said}");
+}
+
 #[test]
 fn a_terminal_that_stands_costs_lines_and_no_time() {
     let place = Workplace::new();

@@ -483,7 +483,7 @@ fn quantiles(
     labelled(to, name, help, Some(Unit::Seconds), values.into_iter())
 }
 
-/// Lines of JSON to a file or standard output, by a thread of their own: who is slow there loses lines.
+/// Lines of JSON to a file or standard output, by a thread of their own: who is slow there loses lines, and so does a full disk, which is told.
 #[derive(Debug)]
 pub(crate) struct MetricsLines(SyncSender<String>);
 
@@ -505,12 +505,25 @@ impl MetricsLines {
             })?)
         };
         let (lines, waiting) = sync_channel::<String>(WAITING_LINES);
+        let name = file.display().to_string();
         std::thread::Builder::new()
             .name("metrics".to_owned())
             .spawn(move || {
+                let mut lost = 0_u64;
                 for line in waiting {
-                    // A full disk loses lines, as a slow one does.
-                    let _ = writeln!(to, "{line}").and_then(|()| to.flush());
+                    match writeln!(to, "{line}").and_then(|()| to.flush()) {
+                        Ok(()) if lost > 0 => {
+                            tracing::info!("--metrics-json {name} is written again; {lost} lines are lost");
+                            lost = 0;
+                        }
+                        Ok(()) => {}
+                        Err(error) => {
+                            lost += 1;
+                            if lost == 1 {
+                                tracing::warn!("--metrics-json {name} cannot be written ({error}): lines are lost until it can; the session goes on");
+                            }
+                        }
+                    }
                 }
             })
             .map_err(|error| {
