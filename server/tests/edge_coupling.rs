@@ -168,7 +168,7 @@ fn observe(server: &str, key: &Path, ended: impl Fn() -> bool) -> (Vec<(f64, f64
     let link = runtime.block_on(connect(options)).expect("joined");
     let begun = Instant::now();
     let (mut states, mut errors, mut first) = (Vec::new(), Vec::new(), None);
-    let (mut running, mut interrupted) = (false, false);
+    let (mut running, mut interrupted, mut before) = (false, false, None);
     while !ended() {
         assert!(begun.elapsed() < PATIENCE, "the bridge does not end");
         std::thread::sleep(Duration::from_millis(5));
@@ -179,13 +179,17 @@ fn observe(server: &str, key: &Path, ended: impl Fn() -> bool) -> (Vec<(f64, f64
             let Some(tool) = state.tools.first() else {
                 continue;
             };
-            let was_running = running;
-            running = state.run == RunState::Running;
+            let ran = std::mem::replace(&mut running, state.run == RunState::Running);
             if !running {
-                first = None;
                 continue;
             }
-            interrupted |= !was_running && !errors.is_empty();
+            // A server that stood still was silent towards the bridge, too.
+            let last = before.replace(state.sample_time_ns);
+            let since_last = last.map(|last| state.sample_time_ns.saturating_sub(last));
+            let stood = since_last.is_some_and(|ns| Duration::from_nanos(ns) > MAX_EDGE_DELAY);
+            if !ran || stood {
+                interrupted |= first.take().is_some();
+            }
             let since = *first.get_or_insert(state.sample_time_ns);
             let elapsed = Duration::from_nanos(state.sample_time_ns.saturating_sub(since));
             let ramped = elapsed > RAMPED_IN;
