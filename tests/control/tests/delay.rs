@@ -252,7 +252,7 @@ fn keeps_its_promise_when_the_delay_jumps(
 
 const FEW: &[u64] = &[3, 5];
 
-/// `cargo test -p taut-control-tests jumps_by_many_seeds -- --ignored --nocapture`: five minutes.
+/// `cargo test -p taut-control-tests jumps_by_many_seeds -- --ignored --nocapture`: seven minutes.
 #[test]
 #[ignore = "1,872 runs"]
 fn a_delay_that_jumps_by_many_seeds() {
