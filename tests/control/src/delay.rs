@@ -266,9 +266,9 @@ pub fn run_with(
     outcome
 }
 
-/// What befalls a run.
+/// What disturbs a run.
 #[derive(Clone, Debug, Default)]
-pub struct Befalls {
+pub struct Disturbance {
     /// How long everything is on its way, ms, beside 0.3 ms.
     pub delay_ms: f64,
     /// What an operator of the server wishes, and in which millisecond.
@@ -283,22 +283,22 @@ pub struct Befalls {
 /// When the scene of the task is none.
 #[must_use]
 pub fn felt_under(
-    befalls: &Befalls,
+    disturbance: &Disturbance,
     rubbing: &Rubbing,
     mode: Mode,
     ticks: u32,
 ) -> (Vec<f64>, Vec<EventKind>) {
-    let near = Impairment::new(0.3 + befalls.delay_ms, 0.0);
+    let near = Impairment::new(0.3 + disturbance.delay_ms, 0.0);
     let (mut up, mut down) = (Way::new(near, 11), Way::new(near, 12));
     let mut nowhere = Way::new(near, 13);
     let mut server = Server::new(&rubbing.task);
     let mut bridge = Bridge::new(rubbing, mode, Passivity::Observe);
     let (mut felt, mut events) = (Vec::new(), Vec::new());
     for tick in 1..=ticks {
-        let wished = befalls.wishes.iter().filter(|(at, _)| *at == tick);
+        let wished = disturbance.wishes.iter().filter(|(at, _)| *at == tick);
         wished.for_each(|(_, wish)| server.loops.arm_switch.wish(*wish));
         let now = TICK * tick;
-        let lost = [0, 1].map(|way| befalls.lost[way].contains(&tick));
+        let lost = [0, 1].map(|way| disturbance.lost[way].contains(&tick));
         let to_server = if lost[0] { &mut nowhere } else { &mut up };
         felt.push(bridge.tick(tick, now, &mut down, to_server, &mut events));
         let to_bridge = if lost[1] { &mut nowhere } else { &mut down };
