@@ -3,9 +3,6 @@
 //! Taken once a second by the thread that looks after the session; read as text for Prometheus (OpenMetrics), and as lines of JSON.
 
 use std::fmt;
-use std::io::Write;
-use std::path::Path;
-use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use prometheus_client::collector::Collector;
@@ -19,12 +16,9 @@ use taut_link::{ClientStatus, Distribution};
 
 use crate::report::SessionReport;
 use crate::report::external::ExternalWrenchReport;
-use crate::shared::failure::Failure;
 
 /// Time between two measurements.
 pub(crate) const PERIOD: Duration = Duration::from_secs(1);
-/// Lines of JSON that wait for a file or a reader that is slow; further ones are left out.
-const WAITING_LINES: usize = 16;
 
 /// One measurement. As JSON, its keys are those of the end report and further ones; they may grow, and keep their meaning.
 #[derive(Clone, Debug, Serialize)]
@@ -481,65 +475,6 @@ fn quantiles(
     ];
     let values = values.map(|(quantile, us)| ([("quantile", quantile.to_owned())], 1e-6 * us));
     labelled(to, name, help, Some(Unit::Seconds), values.into_iter())
-}
-
-/// Lines of JSON to a file or standard output, by a thread of their own: who is slow there loses lines, and so does a full disk, which is told.
-#[derive(Debug)]
-pub(crate) struct MetricsLines(SyncSender<String>);
-
-impl MetricsLines {
-    /// To `file`, or to standard output where that is `-`.
-    ///
-    /// # Errors
-    /// The file cannot be made, or no thread.
-    pub(crate) fn start(file: &Path) -> Result<Self, Failure> {
-        let mut to: Box<dyn Write + Send> = if file == Path::new("-") {
-            Box::new(std::io::stdout())
-        } else {
-            let opened = std::fs::File::options()
-                .create(true)
-                .append(true)
-                .open(file);
-            Box::new(opened.map_err(|error| {
-                Failure::bad_input(format!("--metrics-json {} cannot be written ({error}); name a file in a folder that is there", file.display()))
-            })?)
-        };
-        let (lines, waiting) = sync_channel::<String>(WAITING_LINES);
-        let name = file.display().to_string();
-        std::thread::Builder::new()
-            .name("metrics".to_owned())
-            .spawn(move || {
-                let mut lost = 0_u64;
-                for line in waiting {
-                    match writeln!(to, "{line}").and_then(|()| to.flush()) {
-                        Ok(()) if lost > 0 => {
-                            tracing::info!("--metrics-json {name} is written again; {lost} lines are lost");
-                            lost = 0;
-                        }
-                        Ok(()) => {}
-                        Err(error) => {
-                            lost += 1;
-                            if lost == 1 {
-                                tracing::warn!("--metrics-json {name} cannot be written ({error}): lines are lost until it can; the session goes on");
-                            }
-                        }
-                    }
-                }
-            })
-            .map_err(|error| {
-                Failure::failed(format!(
-                    "the thread of the metrics cannot be started ({error})"
-                ))
-            })?;
-        Ok(Self(lines))
-    }
-
-    /// Hands a line on; never waits.
-    pub(crate) fn write(&self, metrics: &Metrics) {
-        if let Ok(line) = serde_json::to_string(metrics) {
-            let _ = self.0.try_send(line);
-        }
-    }
 }
 
 #[cfg(test)]

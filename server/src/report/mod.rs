@@ -7,6 +7,7 @@ pub mod external;
 pub(crate) mod frames;
 mod loops;
 pub(crate) mod metrics;
+pub(crate) mod metrics_lines;
 mod replay;
 mod session;
 pub mod terminal;
