@@ -3,7 +3,7 @@
 //! | symbol | name in code | unit  | meaning                                                            |
 //! |--------|--------------|-------|--------------------------------------------------------------------|
 //! | d      | `way`        | s     | reading to first use of the set that answers it: [`way_around`]      |
-//! | t      | `horizon`    | s     | reading to last use of the set: `d` and some periods                |
+//! | t      | `horizon`    | s     | reading to last use of the set in full, however the network pauses   |
 //! | v      | `velocity`   | m/s   | of the body's fastest point at the reading                         |
 //! | a      | `HAND_ACCELERATION` | m/s² | most that a hand adds                                        |
 //!
@@ -25,6 +25,8 @@ use god_object::Pose;
 use god_object::spatial::{advance_pose, at_reference_point, from_reference_point};
 use nalgebra::{Point3, Vector6};
 
+use crate::port::Command;
+
 /// A hand in contact tasks changes its speed by no more than this: assumption, m/s².
 const HAND_ACCELERATION: f64 = 5.0;
 /// Periods from a set to the next one that arrives: three in a row may be lost.
@@ -43,13 +45,15 @@ pub fn way_around(age: Duration, set_age: Option<Duration>) -> Duration {
         .unwrap_or(2 * age.min(OLDEST))
 }
 
-/// How much farther than at its reading, m, the body may be until the set that answers it is replaced.
+/// How much farther than at its reading, m, the body may be while the set that answers it is felt in full: until the next sets are there, or, where the
+/// network pauses, until it is [`Command::SET_FULL_UNTIL`] old.
 ///
 /// `velocity` is that of the reference point, then the angular one; `radius` is the body's about that point, m; `way` is [`way_around`];
 /// `period` is the time from set to set. Zero for what is not finite.
 #[must_use]
 pub fn device_ahead(velocity: &Vector6<f64>, radius: f64, way: Duration, period: Duration) -> f64 {
-    let horizon = (way.min(OLDEST) + PERIODS * period).as_secs_f64();
+    let replaced = way.min(OLDEST) + PERIODS * period;
+    let horizon = replaced.max(Command::SET_FULL_UNTIL).as_secs_f64();
     let speed = velocity.fixed_rows::<3>(0).norm() + radius * velocity.fixed_rows::<3>(3).norm();
     let ahead = speed * horizon + 0.5 * HAND_ACCELERATION * horizon * horizon;
     if ahead.is_finite() { ahead } else { 0.0 }
@@ -113,11 +117,11 @@ mod tests {
     fn the_way_grows_with_speed_turn_and_delay_and_nan_is_none() {
         let still = Vector6::zeros();
         let moving = Vector6::new(0.3, 0.0, 0.0, 0.0, 2.0, 0.0);
+        // However near the server is, a set may be the last one for 75 ms: 0.4 m/s, and 14 mm.
         let near = device_ahead(&moving, 0.05, Duration::ZERO, MS);
-        // 0.4 m/s for 4 ms, and 40 um.
-        assert!((near - (0.4 * 4e-3 + 2.5 * 16e-6)).abs() < 1e-12);
-        let far = device_ahead(&moving, 0.05, 40 * MS, MS);
-        assert!(far > 10.0 * near && far > device_ahead(&still, 0.05, 40 * MS, MS));
+        assert!((near - (0.4 * 75e-3 + 2.5 * 75e-3 * 75e-3)).abs() < 1e-12);
+        let far = device_ahead(&moving, 0.05, 150 * MS, MS);
+        assert!(far > 2.0 * near && far > device_ahead(&still, 0.05, 150 * MS, MS));
         let longest = device_ahead(&moving, 0.05, 250 * MS, MS);
         assert_eq!(device_ahead(&moving, 0.05, 3600 * 1000 * MS, MS), longest);
         assert_eq!(device_ahead(&Vector6::repeat(f64::NAN), 0.05, MS, MS), 0.0);

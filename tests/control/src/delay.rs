@@ -50,6 +50,8 @@ pub enum Course {
     Jump,
     /// From anything to anything between none and the largest, by this seed, held for 20 to 400 ms each.
     Jumps(u64),
+    /// It stays, but nothing comes through for anything up to the largest, by this seed, again and again, 20 to 400 ms after the last time.
+    Pauses(u64),
 }
 
 /// How a network's delay grows.
@@ -84,6 +86,7 @@ impl Growth {
             Course::Steady(slope) => slope * elapsed,
             Course::Jump => self.most.as_secs_f64(),
             Course::Jumps(seed) => self.jumped(seed, elapsed),
+            Course::Pauses(_) => 0.0,
         };
         (grown.min(self.most.as_secs_f64()) * 1e9) as u64
     }
@@ -100,6 +103,24 @@ impl Growth {
                 return delay;
             }
         }
+    }
+
+    /// Whether what is sent now is lost.
+    fn loses(&self, now: Duration, way: usize) -> bool {
+        let Course::Pauses(seed) = self.course else {
+            return false;
+        };
+        let elapsed = now.saturating_sub(self.begin).as_secs_f64();
+        let mut random = Random(seed);
+        let mut until = 0.0;
+        while until <= elapsed {
+            let begin = until + 0.02 + 0.38 * random.unit();
+            until = begin + self.most.as_secs_f64() * random.unit();
+            if (begin..until).contains(&elapsed) {
+                return self.ways[way];
+            }
+        }
+        false
     }
 }
 
@@ -174,11 +195,22 @@ impl Rubbing {
     /// Goes down on a wall in half a second and stays there, 15 mm deep if nothing held it.
     #[must_use]
     pub fn pressing_on_wall() -> Self {
-        let via = |time_s, z| ViaPoint {
+        Self::down_on_wall(&[(0.0, 0.04), (0.5, 0.005)])
+    }
+
+    /// The same within so many seconds, once readings are good.
+    #[must_use]
+    pub fn coming_down_on_wall(seconds: f64) -> Self {
+        Self::down_on_wall(&[(0.0, 0.04), (0.6, 0.04), (0.6 + seconds, 0.005)])
+    }
+
+    /// Heights (m) over a wall at these times (s).
+    fn down_on_wall(heights: &[(f64, f64)]) -> Self {
+        let via = |&(time_s, z): &(f64, f64)| ViaPoint {
             time_s,
             pose: Pose::translation(0.0, 0.0, z),
         };
-        match MinJerkPath::new(vec![via(0.0, 0.04), via(0.5, 0.005)], false) {
+        match MinJerkPath::new(heights.iter().map(via).collect(), false) {
             Ok(path) => Self {
                 task: Task::wall(),
                 path,
@@ -239,6 +271,7 @@ pub fn run_with(
 ) -> Outcome {
     let near = Impairment::new(0.3, 0.0);
     let (mut up, mut down) = (Way::new(near, 11), Way::new(near, 12));
+    let mut nowhere = Way::new(near, 13);
     let mut server = Server::new(&rubbing.task);
     let mut bridge = Bridge::new(rubbing, mode, passivity);
     let mut outcome = Outcome {
@@ -253,14 +286,17 @@ pub fn run_with(
         let now = TICK * tick;
         up.set_delay(near.delay_ns + growth.delay_ns(now, 0));
         down.set_delay(near.delay_ns + growth.delay_ns(now, 1));
-        let felt = bridge.tick(tick, now, &mut down, &mut up, &mut outcome.events);
+        let lost = [0, 1].map(|way| growth.loses(now, way));
+        let to_server = if lost[0] { &mut nowhere } else { &mut up };
+        let felt = bridge.tick(tick, now, &mut down, to_server, &mut outcome.events);
         outcome.age_at_end = bridge.newest_data.map_or(now, |taken| now - taken);
         if felt > 0.0 {
             let after = usize::from(now >= growth.begin);
             outcome.largest[after] = outcome.largest[after].max(felt);
             outcome.oldest = outcome.oldest.max(outcome.age_at_end);
         }
-        server.tick(now, &mut up, &mut down);
+        let to_bridge = if lost[1] { &mut nowhere } else { &mut down };
+        server.tick(now, &mut up, to_bridge);
     }
     outcome.given = bridge.of.port().energy().injected();
     outcome

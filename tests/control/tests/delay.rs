@@ -1,5 +1,6 @@
 //! A delay that grows slowly to two seconds: what the hand is given stays what it is given without, and nothing is felt of what is 120 ms old.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use taut_bridge::{ArmWish, EventKind, Passivity};
@@ -183,6 +184,42 @@ fn a_network_that_is_silent_for_a_moment_takes_no_force_from_an_edge() {
     }
 }
 
+/// What is felt of a wall that the hand comes down on in so many seconds, by a network of this delay that loses what is sent meanwhile: from which
+/// millisecond on, and at most, N.
+fn met(seconds: f64, delay_ms: f64, lost: [Range<u32>; 2]) -> (u32, f64) {
+    let disturbance = Disturbance {
+        delay_ms,
+        lost,
+        ..Disturbance::default()
+    };
+    let rubbing = Rubbing::coming_down_on_wall(seconds);
+    let (felt, _) = felt_under(&disturbance, &rubbing, Mode::Edge, 1400);
+    let at = felt.iter().position(|force| *force > 0.0);
+    let largest = felt.into_iter().fold(0.0, f64::max);
+    (at.expect("a wall is met") as u32, largest)
+}
+
+#[test]
+fn a_wall_that_is_met_while_the_network_is_silent_is_felt_at_once() {
+    // At 0.1 to 0.5 m/s.
+    for seconds in [1.0, 0.5, 0.25, 0.15] {
+        for delay_ms in [0.0, 5.0, 15.0, 25.0] {
+            let (at, largest) = met(seconds, delay_ms, [0..0, 0..0]);
+            let left = 65 - (2.0 * delay_ms) as u32;
+            for ways in [[true, false], [false, true], [true, true]] {
+                for before in [1, 20, 50] {
+                    let begin = at - before;
+                    let lost = ways.map(|lost| begin..begin + if lost { left } else { 0 });
+                    let (later, most) = met(seconds, delay_ms, lost);
+                    let case = format!("{seconds} s, {delay_ms} ms, {ways:?}, {before} ms before");
+                    assert!(later <= at + 1, "{case}: {later} for {at} ms");
+                    assert!(most < 1.05 * largest, "{case}: {most} for {largest} N");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn a_steadily_slower_network_and_a_wall() {
     keeps_its_promise_at_any_slope("wall", &Rubbing::on_wall(), &[2000, 2800, 3600]);
@@ -199,7 +236,8 @@ fn a_steadily_slower_network_and_a_corner() {
     keeps_its_promise_at_any_slope("corner", &corner, &[300, 1000, 1600]);
 }
 
-/// The delay jumps: once to one of these lengths, or again and again to anything below it by these seeds, on either way or both, wherever the hand is.
+/// The delay jumps: once to one of these lengths, or again and again to anything below it by these seeds, or nothing comes through for as long; on either
+/// way or both, wherever the hand is.
 fn keeps_its_promise_when_the_delay_jumps(
     name: &str,
     rubbing: &Rubbing,
@@ -230,13 +268,14 @@ fn keeps_its_promise_when_the_delay_jumps(
                 });
             }
             for seed in seeds.iter().copied() {
-                let (begin, course) = (Duration::from_millis(300), Course::Jumps(seed));
-                try_it(Growth {
-                    begin,
-                    ways,
-                    course,
-                    most,
-                });
+                for course in [Course::Jumps(seed), Course::Pauses(seed)] {
+                    try_it(Growth {
+                        begin: Duration::from_millis(300),
+                        ways,
+                        course,
+                        most,
+                    });
+                }
             }
         }
     }
