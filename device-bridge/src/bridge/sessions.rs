@@ -121,7 +121,12 @@ impl Run<'_> {
             };
             link = joined;
             if same_place(&self.scene, link.description()) {
-                tracing::info!("joined again: the force comes back as after any silence");
+                let after = if self.epoch == Some(link.epoch()) {
+                    "any silence"
+                } else {
+                    "a restart"
+                };
+                tracing::info!("joined again: the force comes back as after {after}");
             } else {
                 bridge = match self.placed(bridge, link.description()) {
                     Ok(placed) => placed,

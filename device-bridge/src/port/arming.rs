@@ -37,9 +37,9 @@ pub(super) const OUTAGE: Duration = Duration::from_secs(1);
 /// Who commands after a [`restart`](super::DevicePort::restart).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CommandSource {
-    /// Who did before: the same process, heard by another connection.
+    /// Who did before: the same session of the same process, heard by another connection.
     Same,
-    /// Another process: it knows nothing of what was felt.
+    /// Another process, or another session of it: it knows nothing of what was felt.
     Other,
 }
 
