@@ -115,7 +115,7 @@ pub struct Header {
     pub version: u8,
     /// What the payload is.
     pub kind: Kind,
-    /// Incarnation of the server: drawn at random when it starts.
+    /// Incarnation of the server: drawn at random when a session of it starts.
     pub epoch: u32,
     /// Session number of the client; 0 is the server.
     pub sender: u16,

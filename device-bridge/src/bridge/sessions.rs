@@ -121,7 +121,12 @@ impl Run<'_> {
             };
             link = joined;
             if same_place(&self.scene, link.description()) {
-                tracing::info!("joined again: the force comes back as after any silence");
+                let after = if self.epoch == Some(link.epoch()) {
+                    "any silence"
+                } else {
+                    "a restart"
+                };
+                tracing::info!("joined again: the force comes back as after {after}");
             } else {
                 bridge = match self.placed(bridge, link.description()) {
                     Ok(placed) => placed,
@@ -149,6 +154,8 @@ impl Run<'_> {
         let past = bridge.close();
         let mut placed = (self.build)(scene)?.ok_or_else(other_scene)?;
         placed.go_on_from(past);
+        // Its port knows nothing of what was wished at the one before.
+        self.wishes.begin_again();
         self.scene = scene.clone();
         self.safety = *placed.port().settings();
         tracing::info!(
@@ -391,7 +398,74 @@ fn edge_coupler(
 
 #[cfg(test)]
 mod tests {
+    use taut_link::proto::scene::BodyDescription;
+    use taut_link::proto::{MeshHash, PoseF64};
+    use taut_link::{RejoinPolicy, create_key_file};
+
+    use super::super::over::Alive;
+    use super::super::setup::{Motion, build_loop, client_options};
     use super::*;
+    use crate::arm_switch::ArmWish;
+    use crate::port::Rearm;
+    use crate::signals::EndFlag;
+
+    /// A body that starts at this height, m.
+    fn scene(height: f64) -> SceneDescription {
+        let body = BodyDescription {
+            name: "tip".into(),
+            mesh: MeshHash::of(&[]),
+            pose: PoseF64 {
+                position: [0.0, 0.0, height],
+                ..PoseF64::IDENTITY
+            },
+            colour: [1.0; 4],
+        };
+        SceneDescription::of_body("wall", body)
+    }
+
+    #[test]
+    fn who_wanted_no_force_is_asked_in_another_place_too() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let key = folder.path().join("key");
+        create_key_file(&key).expect("a key");
+        let mut args = BridgeArgs::joining("127.0.0.1:1", "bridge").expect("valid");
+        args.key = Some(key);
+        let motion = Motion::Held {
+            path: None,
+            strings: None,
+        };
+        let mut build = |scene: &SceneDescription| build_loop(&args, &motion, scene).map(Some);
+        let mut bridge = build_loop(&args, &motion, &scene(0.0)).expect("simulated");
+        assert_eq!(bridge.port().settings().rearm, Rearm::Automatic);
+        let options = client_options(&args).expect("a key");
+        let mut run = Run {
+            args: &args,
+            scene: scene(0.0),
+            epoch: None,
+            rejoiner: Rejoiner::new(options, RejoinPolicy::default()),
+            runtime: tokio::runtime::Builder::new_current_thread()
+                .build()
+                .expect("a runtime"),
+            over: Over {
+                end: EndFlag::default(),
+                deadline: None,
+                alive: Alive::default(),
+            },
+            safety: *bridge.port().settings(),
+            wishes: Arc::default(),
+            totals: Totals::new(),
+            build: &mut build,
+        };
+        run.wishes.wish(ArmWish::Disarm);
+        assert_eq!(run.wishes.take(), Some(ArmWish::Disarm), "the loop's");
+        for height in [0.1, 0.2] {
+            bridge = run.placed(bridge, &scene(height)).expect("simulated");
+            assert_eq!(run.wishes.take(), Some(ArmWish::Disarm), "at {height} m");
+        }
+        run.wishes.wish(ArmWish::Arm);
+        let _ = run.placed(bridge, &scene(0.3)).expect("simulated");
+        assert_eq!(run.wishes.take(), None, "of the place before");
+    }
 
     #[test]
     fn a_watcher_that_breaks_down_takes_the_device_loop_with_it() {

@@ -32,6 +32,8 @@ pub struct ArmState {
     pub reports: u64,
     /// Whether the newest may be used now.
     pub is_usable: bool,
+    /// How long before it was handed on the newest was measured, as far as the driver knows.
+    pub age: Duration,
     /// Of the cursor.
     pub position: [f64; 3],
     /// Of the cursor.
@@ -88,6 +90,7 @@ pub struct ArmDevice {
     placement: Placement,
     /// Pose of the cursor on the workbench when the first state came, and of the body's frame at G then.
     anchored: Option<(Pose, Pose)>,
+    /// The newest state that was taken, and when it was measured.
     seen: (u64, Duration),
     /// The sample of the newest state, frame at G.
     at_g: Pose,
@@ -162,7 +165,9 @@ impl ArmDevice {
     fn take(&mut self, now: Duration, state: &ArmState) -> Result<(), DeviceFault> {
         let cursor = self.on_workbench(state).ok_or(DeviceFault::NotFinite)?;
         let next = self.target(&cursor, state.orientation.is_some());
-        let passed = now.saturating_sub(self.seen.1).as_secs_f64();
+        // Not before the one before it: ages are said more coarsely than states come.
+        let measured = now.saturating_sub(state.age).max(self.seen.1);
+        let passed = (measured - self.seen.1).as_secs_f64();
         let is_first = self.seen.0 == 0 || self.was_lost || passed > MAX_AGE.as_secs_f64();
         let turned = (next.rotation * self.at_g.rotation.inverse()).scaled_axis();
         let before: Vector3<f64> = self.velocity.fixed_rows::<3>(3).into();
@@ -180,7 +185,7 @@ impl ArmDevice {
         let moving = self.mapping.origin.rotation * moving;
         self.velocity = stacked(&self.placement.vector_in_world(&moving), &turning);
         self.at_g = next;
-        self.seen = (state.reports, now);
+        self.seen = (state.reports, measured);
         Ok(())
     }
 
@@ -214,7 +219,7 @@ impl Device for ArmDevice {
         }
         let is_new = state.reports != self.seen.0;
         let age = if is_new {
-            Duration::ZERO
+            state.age
         } else {
             now.saturating_sub(self.seen.1)
         };
@@ -257,5 +262,94 @@ fn actuated(limits: &DeviceLimits) -> u8 {
         limits if *limits == DeviceLimits::UNLIMITED => 0, // no motors
         limits if limits.max_torque > 0.0 => 6,
         _ => 3,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use nalgebra::Point3;
+
+    use super::*;
+    use crate::devices::PolhemSettings;
+    use crate::port::{ArmingState, Command, DevicePort, SafetySettings};
+
+    /// Says what a test wants.
+    struct Said(Arc<Mutex<ArmState>>);
+
+    impl ArmPort for Said {
+        fn newest(&mut self) -> ArmState {
+            *self.0.lock().expect("whole")
+        }
+
+        fn push(&mut self, _force: [f64; 3]) {}
+    }
+
+    fn ms(time: u64) -> Duration {
+        Duration::from_millis(time)
+    }
+
+    fn arm() -> (Arc<Mutex<ArmState>>, ArmDevice) {
+        let said = Arc::<Mutex<ArmState>>::default();
+        let placement = Placement::plain(Pose::identity(), Point3::origin());
+        let arm = PolhemSettings::at("here").arm();
+        let device = ArmDevice::new(Box::new(Said(Arc::clone(&said))), arm, placement);
+        (said, device)
+    }
+
+    /// State number `reports`, of `age`: 0.1 m/s along an axis.
+    fn state(reports: u64, age: Duration) -> ArmState {
+        ArmState {
+            reports,
+            is_usable: true,
+            age,
+            position: [1e-4 * reports as f64, 0.0, 0.0],
+            ..ArmState::default()
+        }
+    }
+
+    #[test]
+    fn a_sample_is_as_old_as_its_driver_says() {
+        let (said, mut device) = arm();
+        // The third says that it is older than the second: it is not.
+        for (reports, age, measured) in [(1, 5, 96), (2, 5, 97), (3, 12, 97), (4, 0, 104)] {
+            *said.lock().expect("whole") = state(reports, ms(age));
+            let sample = device.read(ms(100 + reports)).expect("a sample");
+            assert_eq!(sample.time, ms(measured), "{reports}");
+        }
+        *said.lock().expect("whole") = state(5, ms(19));
+        assert!(device.read(ms(105)).is_ok());
+        assert!(device.read(ms(124)).is_ok());
+        assert_eq!(
+            device.read(ms(125)),
+            Err(DeviceFault::Lost { age: ms(21) }),
+            "since it was measured"
+        );
+    }
+
+    #[test]
+    fn no_force_120_ms_after_the_last_state_was_measured() {
+        for age in [0, 10, 19] {
+            let (said, device) = arm();
+            let settings = SafetySettings::default();
+            let start = Pose::identity();
+            let mut port = DevicePort::new(Box::new(device), settings, Point3::origin(), &start);
+            let push = Vector6::new(0.0, 0.0, 2.0, 0.0, 0.0, 0.0);
+            for time in 1..1200 {
+                if time <= 1000 {
+                    *said.lock().expect("whole") = state(time, ms(age));
+                }
+                let now = ms(1000 + time);
+                let report = port.tick(now, |_| Some(Command::fresh(now, push)));
+                let felt = report.wrench.norm();
+                if time == 1000 {
+                    assert_eq!(report.state, ArmingState::Armed, "{age}");
+                }
+                if time >= 1120 - age {
+                    assert_eq!(felt, 0.0, "{age} ms old, at {time} ms");
+                }
+            }
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! One connection to a service, without sockets: which arm and which grip are used, what they said last, and what is said next.
 
+use std::time::Duration;
+
 use crate::devices::ArmState;
 
 use super::message::{GripKind, MessageError, PERMUTATION, Said, Say};
@@ -179,6 +181,7 @@ impl Exchange {
         let mut state = ArmState {
             reports: self.state.reports + 1,
             is_usable: true,
+            age: Duration::ZERO,
             position: arm.position.ok_or(Unusable::NoPosition)?,
             velocity: arm.velocity.unwrap_or_default(),
             orientation: None,

@@ -164,7 +164,13 @@ impl Calls {
             pace.read();
             self.slow(begun);
             match answer {
-                Answer::Good => take(&sample, info.with_orientation, line),
+                Answer::Good => {
+                    let reports = line.state.reports + 1;
+                    if let Some(state) = state_of(&sample, info.with_orientation, reports) {
+                        line.state = state;
+                        line.publish();
+                    }
+                }
                 Answer::NothingNew => {}
                 Answer::NotReady => not_ready(line),
                 Answer::Gone | Answer::Failed(_) => return Err(device.error_text(answer)),
@@ -205,16 +211,17 @@ impl Calls {
     }
 }
 
-/// The sample is handed on; one that is no pose as NaN, which the device names.
-fn take(sample: &RawSample, with_orientation: bool, line: &mut PluginLine) {
+/// The sample as the state of this number; `None` where it is too old. One that is no pose has NaN, which the device names.
+fn state_of(sample: &RawSample, with_orientation: bool, reports: u64) -> Option<ArmState> {
     let worth = sample.worth(with_orientation);
     if worth == Worth::Stale {
-        return;
+        return None;
     }
     let is_good = worth == Worth::Good;
-    line.state = ArmState {
-        reports: line.state.reports + 1,
+    Some(ArmState {
+        reports,
         is_usable: true,
+        age: Duration::try_from_secs_f64(sample.age).unwrap_or_default(), // it is none where the sample is none
         position: if is_good {
             sample.position
         } else {
@@ -224,11 +231,36 @@ fn take(sample: &RawSample, with_orientation: bool, line: &mut PluginLine) {
         orientation: with_orientation.then_some(sample.orientation),
         turning: sample.turning().filter(|_| with_orientation),
         buttons: (sample.buttons & 0xffff) as u16,
-    };
-    line.publish();
+    })
 }
 
 fn not_ready(line: &mut PluginLine) {
     line.state.is_usable = false;
     line.publish();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_said_of_a_samples_age_goes_with_it() {
+        let aged = |age| RawSample {
+            position: [0.0; 3],
+            velocity: [0.0; 3],
+            age,
+            ..RawSample::UNSET
+        };
+        for (age, handed_on) in [
+            (0.0, Some(Duration::ZERO)),
+            (0.004, Some(Duration::from_millis(4))),
+            (0.02, None),
+        ] {
+            let state = state_of(&aged(age), false, 7);
+            assert_eq!(state.map(|state| state.age), handed_on, "{age} s");
+        }
+        // No age is no pose, as ever.
+        let unsaid = state_of(&aged(f64::NAN), false, 7).expect("a state");
+        assert!(unsaid.position[0].is_nan() && unsaid.age.is_zero());
+    }
 }

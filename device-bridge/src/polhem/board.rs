@@ -181,6 +181,7 @@ impl Serial {
         line.state = ArmState {
             reports: line.state.reports + 1,
             is_usable: true,
+            age: Duration::ZERO,
             position: frame.position,
             velocity,
             orientation: Some([q.w, q.i, q.j, q.k]),

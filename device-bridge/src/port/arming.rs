@@ -15,6 +15,8 @@
 //!              Faulted ── asked again (or automatic), inputs good ──► Arming
 //! ```
 //!
+//! Who asks on the way down is answered at its end.
+//!
 //! | name in code | unit | meaning |
 //! |--------------|------|---------|
 //! | `gain`       | –    | share of the wrench that is let through, in [0, 1] |
@@ -35,9 +37,9 @@ pub(super) const OUTAGE: Duration = Duration::from_secs(1);
 /// Who commands after a [`restart`](super::DevicePort::restart).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CommandSource {
-    /// Who did before: the same process, heard by another connection.
+    /// Who did before: the same session of the same process, heard by another connection.
     Same,
-    /// Another process: it knows nothing of what was felt.
+    /// Another process, or another session of it: it knows nothing of what was felt.
     Other,
 }
 
@@ -133,6 +135,8 @@ pub(super) struct Arming {
     /// When commands were good last, while there was force.
     commanded: Option<Duration>,
     was_held: bool,
+    /// Somebody asked for force on the way down, and has not taken it back.
+    asked: bool,
 }
 
 impl Arming {
@@ -150,6 +154,7 @@ impl Arming {
             last: None,
             commanded: None,
             was_held: false,
+            asked: false,
         }
     }
 
@@ -175,6 +180,7 @@ impl Arming {
 
     /// The commands come by another way from now on: what there was is gone, and new ones ramp in from zero, if nobody has to be asked.
     pub(super) fn restart(&mut self, source: CommandSource) {
+        self.asked = false; // of whoever commanded before
         if self.state.is_off() || self.cause_lasts() {
             return;
         }
@@ -202,6 +208,7 @@ impl Arming {
     ) -> [Option<EventKind>; 2] {
         // A clock that goes back passes no time, and a stall of the caller lets no force in at once.
         let passed = now.saturating_sub(self.last.unwrap_or(now));
+        let stalled = passed > settings.hold;
         let passed = passed.min(settings.hold);
         self.last = Some(self.last.map_or(now, |last| last.max(now)));
 
@@ -221,6 +228,9 @@ impl Arming {
         if self.follow_causes(now, settings, situation) {
             events[1] = Some(EventKind::Arming);
         }
+        if self.cause_lasts() && self.keep_request(stalled, situation) {
+            events[0] = events[0].or(Some(EventKind::ArmRefused));
+        }
         match self.state {
             ArmingState::Arming => {
                 self.gain = (self.gain + ratio(passed, settings.ramp_in)).min(1.0);
@@ -236,7 +246,22 @@ impl Arming {
             ArmingState::Fading => events[1] = self.fall(now, settings),
             _ => {}
         }
+        if self.state.is_off() && std::mem::take(&mut self.asked) {
+            events[1] = self.while_off(&Situation {
+                asked: true,
+                ..*situation
+            });
+        }
         events
+    }
+
+    /// What is asked on the way down waits for its end, where the force may come again from zero: who presses the dead-man's button again holds it by
+    /// then. Not longer: it is taken back by who lets go or disarms, and refused where a fault or a stall comes in between. Whether it is refused.
+    fn keep_request(&mut self, stalled: bool, situation: &Situation) -> bool {
+        let asked = (self.asked || situation.asked) && !situation.disarm;
+        let refused = stalled || situation.fault_since.is_some() || !situation.held;
+        self.asked = asked && !refused;
+        asked && refused
     }
 
     /// No force: whether it may come.

@@ -350,6 +350,7 @@ impl DevicePort {
         let damping = self.controller.step(
             self.work,
             self.energy.travel(),
+            self.motion.span().as_secs_f64(),
             passed.as_secs_f64(),
             &shared,
         );

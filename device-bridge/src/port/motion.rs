@@ -22,8 +22,10 @@ const MEMORY: Duration = Duration::from_millis(20);
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Motion {
     velocity: Vector6<f64>,
-    /// Time of the newest good sample.
+    /// Time of the newest good sample that moved.
     sampled: Option<Duration>,
+    /// From the one before it to that.
+    span: Duration,
     speed: f64,
 }
 
@@ -42,7 +44,8 @@ impl Motion {
         let Some(last) = self.sampled.replace(time) else {
             return;
         };
-        let passed = time.saturating_sub(last).max(period).as_secs_f64();
+        self.span = time.saturating_sub(last).max(period);
+        let passed = self.span.as_secs_f64();
         let weight = (passed / AVERAGE.as_secs_f64()).min(1.0);
         self.velocity += (travel / passed - self.velocity) * weight;
         let linear: Vector3<f64> = self.velocity.fixed_rows::<3>(0).into();
@@ -59,6 +62,11 @@ impl Motion {
     /// Nothing is known of the motion any more.
     pub(super) fn forget(&mut self) {
         *self = Self::default();
+    }
+
+    /// Time that the newest travel took; zero before any.
+    pub(super) fn span(&self) -> Duration {
+        self.span
     }
 
     /// m/s.

@@ -3,12 +3,13 @@
 //! | symbol | name in code | unit | meaning |
 //! |--------|--------------|------|---------|
 //! | E      | `debt`       | J    | energy given to the hand that neither it nor a moving obstacle had put in; negative is credit |
-//! | v      | `velocity`   | m/s, rad/s | of the reference point, over the last tick |
+//! | v      | `velocity`   | m/s, rad/s | of the reference point, between the last two samples that differ |
+//! | T      | `span`       | s    | between these, a tick or more |
 //! | alpha  | `damping`    | N s/m | `E / (T v^2)`, at most `max_damping` |
 //! | K, r   | [`ContactBound`] | N/m, m | the stiffest contact that the port renders |
 //!
-//! While E > 0 the wrench gets `-alpha v` on top, so that the next tick takes E back, as far as the damping's limit allows; what
-//! is left waits for the next tick. A spring stores energy that the hand has put in and may give it back: that is credit, kept up to
+//! While E > 0 the wrench gets `-alpha v` on top, so that the time to the next sample takes E back, as far as the damping's limit allows; what
+//! is left waits for the next. A spring stores energy that the hand has put in and may give it back: that is credit, kept up to
 //! `max_credit`. After [`WINDOW`] without a commanded wrench nothing is stored any more, and credit is forgotten.
 //!
 //! Damping cannot undo a force that should not be there: one of a surface which a late network moves under a hand that rests. So a commanded wrench (f, t)
@@ -145,12 +146,13 @@ impl PassivityController {
         }
     }
 
-    /// `work` is what the wrench of the last tick has given to the hand, J; `travel` the displacement of the reference point and the
-    /// rotation meanwhile, over `seconds`; `commanded` the wrench before the controller.
+    /// `work` is what the wrench has given to the hand since the last tick, J, which was `seconds` ago; `travel` the displacement of the reference
+    /// point and the rotation between the newest samples, over `span`, s; `commanded` the wrench before the controller.
     pub(super) fn step(
         &mut self,
         work: f64,
         travel: &Vector6<f64>,
+        span: f64,
         seconds: f64,
         commanded: &Vector6<f64>,
     ) -> Damping {
@@ -167,21 +169,20 @@ impl PassivityController {
             self.debt = self.debt.max(0.0);
         }
         self.forgiven = (self.forgiven + FORGIVEN * seconds).clamp(0.0, self.debt.max(0.0));
-        let due = self.debt > settings.dead_band && seconds > 0.0; // false for NaN
+        let due = self.debt > settings.dead_band && span > 0.0; // false for NaN
         if !due {
             return Damping::NONE;
         }
-        let linear: Vector3<f64> = travel.fixed_rows::<3>(0) / seconds;
-        let angular: Vector3<f64> = travel.fixed_rows::<3>(3) / seconds;
+        let linear: Vector3<f64> = travel.fixed_rows::<3>(0) / span;
+        let angular: Vector3<f64> = travel.fixed_rows::<3>(3) / span;
         // Translation first: it carries nearly all of the energy. The rotation takes what is left.
-        let (force, taken) =
-            self.brake(&linear, settings.max_damping, SLOWEST.0, self.debt, seconds);
+        let (force, taken) = self.brake(&linear, settings.max_damping, SLOWEST.0, self.debt, span);
         let (torque, _) = self.brake(
             &angular,
             settings.max_rotational_damping,
             SLOWEST.1,
             self.debt - taken,
-            seconds,
+            span,
         );
         Damping {
             wrench: join(&force, &torque),
@@ -252,11 +253,11 @@ mod tests {
     fn it_takes_out_what_came_out_in_one_tick_if_it_may() {
         let mut controller = controller();
         let travel = Vector6::x() * (0.1 * T);
-        let damping = controller.step(1e-4, &travel, T, &Vector6::x());
+        let damping = controller.step(1e-4, &travel, T, T, &Vector6::x());
         // 1e-4 J at 0.1 m/s in 1 ms: 10 N s/m.
         assert!((damping.wrench.x + 1.0).abs() < 1e-12);
         // At the same velocity that force gives -1e-4 J: the debt is paid.
-        let paid = controller.step(damping.wrench.x * travel.x, &travel, T, &Vector6::x());
+        let paid = controller.step(damping.wrench.x * travel.x, &travel, T, T, &Vector6::x());
         assert_eq!(paid.wrench, Vector6::zeros());
     }
 
@@ -265,13 +266,13 @@ mod tests {
         let mut controller = controller();
         let travel = Vector6::x() * (0.1 * T);
         for _ in 0..10 {
-            let damping = controller.step(0.01, &travel, T, &Vector6::x());
+            let damping = controller.step(0.01, &travel, T, T, &Vector6::x());
             assert!(
                 (damping.wrench.x + 2.0).abs() < 1e-12,
                 "20 N s/m at 0.1 m/s"
             );
         }
-        let standing = controller.step(0.0, &Vector6::zeros(), T, &Vector6::x());
+        let standing = controller.step(0.0, &Vector6::zeros(), T, T, &Vector6::x());
         assert_eq!(standing.wrench, Vector6::zeros());
         assert!(standing.debt > 0.09);
     }
@@ -280,16 +281,16 @@ mod tests {
     fn credit_is_kept_in_contact_and_forgotten_in_free_space() {
         let travel = Vector6::x() * (0.1 * T);
         let mut in_contact = controller();
-        let _ = in_contact.step(-0.01, &travel, T, &Vector6::x());
-        let back = in_contact.step(0.009, &travel, T, &Vector6::x());
+        let _ = in_contact.step(-0.01, &travel, T, T, &Vector6::x());
+        let back = in_contact.step(0.009, &travel, T, T, &Vector6::x());
         assert_eq!(back, Damping::NONE);
 
         let mut let_go = controller();
-        let _ = let_go.step(-0.01, &travel, T, &Vector6::x());
+        let _ = let_go.step(-0.01, &travel, T, T, &Vector6::x());
         for _ in 0..31 {
-            let _ = let_go.step(0.0, &travel, T, &Vector6::zeros());
+            let _ = let_go.step(0.0, &travel, T, T, &Vector6::zeros());
         }
-        let acts = let_go.step(0.009, &travel, T, &Vector6::x());
+        let acts = let_go.step(0.009, &travel, T, T, &Vector6::x());
         assert!(acts.debt > 0.0 && acts.wrench.x < 0.0);
     }
 
@@ -304,7 +305,7 @@ mod tests {
         for step in way {
             let travel = Vector6::x() * step;
             given += held * step;
-            let damping = controller.step(held * step, &travel, T, &wrench);
+            let damping = controller.step(held * step, &travel, T, T, &wrench);
             held = controller.within_reserve(&wrench).x + damping.wrench.x;
         }
         (given, held)
@@ -339,7 +340,7 @@ mod tests {
             let (force, travel) = (1000.0 * depth, Vector6::x() * (depth - next));
             given += force * travel.x;
             let commanded = Vector6::x() * (1000.0 * next);
-            let _ = controller.step(force * travel.x, &travel, T, &commanded);
+            let _ = controller.step(force * travel.x, &travel, T, T, &commanded);
             assert_eq!(controller.within_reserve(&commanded), commanded, "{tick}");
             depth = next;
         }
@@ -353,7 +354,7 @@ mod tests {
             let mut controller = controller();
             for tick in 0..100 {
                 controller.grant(7.0 + 1e-3 * f64::from(tick), &push, &(push * share));
-                let _ = controller.step(1e-3, &(Vector6::x() * 1e-4), T, &push);
+                let _ = controller.step(1e-3, &(Vector6::x() * 1e-4), T, T, &push);
             }
             let left = controller.within_reserve(&(Vector6::x() * 4.0));
             assert_eq!(left.x < 3.9, scaled, "{share}: {left}");
@@ -388,7 +389,7 @@ mod tests {
                 let work = held.dot(&travel);
                 given += work;
                 most_given = most_given.max(given);
-                let damping = controller.step(work, &travel, T, &commanded);
+                let damping = controller.step(work, &travel, T, T, &commanded);
                 held = controller.within_reserve(&commanded) + damping.wrench;
             }
             // One tick at a third of a metre per second.
@@ -400,7 +401,7 @@ mod tests {
     fn work_that_is_not_finite_changes_nothing() {
         let mut controller = controller();
         let travel = Vector6::x() * (0.1 * T);
-        let damping = controller.step(f64::NAN, &travel, T, &Vector6::x());
+        let damping = controller.step(f64::NAN, &travel, T, T, &Vector6::x());
         assert_eq!(damping, Damping::NONE);
     }
 }

@@ -65,7 +65,7 @@ impl Default for ContactBound {
     }
 }
 
-/// Who arms at the start, after a fault and after an outage: more than a second without good commands, or another process that commands. After a
+/// Who arms at the start, after a fault and after an outage: more than a second without good commands, or another process or session that commands. After a
 /// shorter silence the force ramps in by itself in both cases.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rearm {

@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use nalgebra::{Point3, Vector6};
 
+mod asking;
+mod damping;
 mod faults;
 
 use super::*;

@@ -146,6 +146,7 @@ impl Talker {
         line.state = ArmState {
             reports: line.state.reports + 1,
             is_usable: true,
+            age: Duration::ZERO,
             position: position.into(),
             velocity: velocity.into(),
             orientation: self

@@ -208,6 +208,8 @@ fn run_state(device: &DeviceState) -> RunState {
         _ if device.faulty => RunState::Fault,
         ArmingState::Faulted => RunState::Fault,
         ArmingState::Disarmed => RunState::Paused,
+        // On its way there: nothing comes back unless it is asked for.
+        ArmingState::Fading if !device.safety.gives => RunState::Paused,
         _ => RunState::Running,
     }
 }
@@ -545,6 +547,21 @@ mod tests {
             state.events.last().map(|event| event.code),
             Some(event_code::FAULT)
         );
+    }
+
+    #[test]
+    fn a_force_that_fades_until_somebody_asks_is_paused_from_the_first() {
+        for (arming, gives, run) in [
+            (ArmingState::Armed, true, RunState::Running),
+            (ArmingState::Fading, true, RunState::Running),
+            (ArmingState::Fading, false, RunState::Paused),
+            (ArmingState::Disarmed, false, RunState::Paused),
+            (ArmingState::Faulted, false, RunState::Fault),
+        ] {
+            let mut device = DeviceState::at_start(&Pose::identity());
+            (device.safety.arming, device.safety.gives) = (arming, gives);
+            assert_eq!(run_state(&device), run, "{arming:?}, gives: {gives}");
+        }
     }
 
     #[test]

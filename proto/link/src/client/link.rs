@@ -100,7 +100,7 @@ impl ClientLink {
         self.session
     }
 
-    /// Incarnation of the server: another process has another one.
+    /// Incarnation of the server: another process has another one, and so has another session of the same one, as after a change of the scene.
     pub fn epoch(&self) -> u32 {
         self.epoch
     }

@@ -187,7 +187,7 @@ impl ServerLink {
         self.shared.key.server_pin()
     }
 
-    /// Incarnation of this server, in every datagram's header: no secret, it is sent clear.
+    /// Incarnation of this server, another with every [`serve`], in every datagram's header: no secret, it is sent clear.
     pub fn epoch(&self) -> u32 {
         self.shared.epoch
     }

@@ -169,7 +169,7 @@ impl OperatorDesk {
         })
     }
 
-    /// Asks for force. A port that gives it already says nothing, and neither does one whose force is just going: the state tells.
+    /// Asks for force. A port that gives it already says nothing, and neither does one that is asked for none meanwhile: the state tells.
     fn arm(&self) -> Outcome {
         let answers = [
             (EventKind::Arming, Ok("armed: the force ramps in")),
@@ -180,7 +180,9 @@ impl OperatorDesk {
         ];
         let settled = |run| match run {
             RunState::Running => Some(Ok("armed already")),
-            RunState::Paused => Some(Err("not armed: the force was still fading; ask again")),
+            RunState::Paused => Some(Err(
+                "not armed: no force was asked for at the same time; ask again",
+            )),
             RunState::Waiting | RunState::Fault => None,
         };
         self.ask(ArmWish::Arm, answers, settled, Err(BETWEEN))
