@@ -9,6 +9,8 @@ use taut_proto::web::is_from_here;
 use tower_layer::Layer;
 use tower_service::Service;
 
+use crate::guests::Place;
+
 /// Begin of the names of the stream's methods by which a client would put something into it.
 const WRITING: &str = "Write";
 
@@ -71,6 +73,9 @@ where
 
     fn call(&mut self, request: Request<B>) -> Self::Future {
         if self.guard.lets_through(&request) {
+            if let Some(place) = request.extensions().get::<Place>() {
+                place.leave();
+            }
             return Either::Left(self.inner.call(request));
         }
         let mut refusal = Response::new(R::default());

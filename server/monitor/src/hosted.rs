@@ -27,11 +27,11 @@ use rerun::sink::{LogSink, SinkFlushError};
 use tokio::sync::watch;
 use tonic::service::Routes;
 use tonic::transport::Server;
-use tonic::transport::server::TcpIncoming;
 use tonic::{Request, Response, Status, Streaming};
 
 use crate::error::MonitorError;
 use crate::guard::Guard;
+use crate::guests::incoming;
 use crate::history::History;
 
 /// Pings by which a client that is gone without a word is found.
@@ -176,11 +176,6 @@ fn file(viewer: &Arc<WebViewerData>, path: &str) -> axum::response::Response {
         bytes.len().to_string(),
     );
     ([(header::CONTENT_TYPE, kind)], [length], bytes).into_response()
-}
-
-fn incoming(socket: TcpListener) -> std::io::Result<TcpIncoming> {
-    let listener = tokio::net::TcpListener::from_std(socket)?;
-    Ok(TcpIncoming::from(listener).with_nodelay(Some(true)))
 }
 
 async fn end(mut stopped: watch::Receiver<()>) {
