@@ -3,7 +3,6 @@
 use std::task::{Context, Poll};
 
 use futures_util::future::{Either, Ready, ready};
-use http::header::{HOST, HeaderName, ORIGIN};
 use http::{Request, Response, StatusCode};
 use taut_proto::web::is_from_here;
 use tower_layer::Layer;
@@ -23,20 +22,24 @@ pub(crate) struct Guard {
 
 impl Guard {
     fn lets_through<B>(self, request: &Request<B>) -> bool {
-        let header = |name: HeaderName| {
+        let said = |name: &str| {
             let value = request.headers().get(name)?;
             // What is no text is no address either.
             Some(value.to_str().unwrap_or("?"))
         };
         // HTTP/2 names the server in the request's target.
         let target = request.uri().authority().map(http::uri::Authority::as_str);
+        let header = |name: &str| match name {
+            "host" => target.or_else(|| said(name)),
+            name => said(name),
+        };
         let writes = request
             .uri()
             .path()
             .rsplit('/')
             .next()
             .is_some_and(|method| method.starts_with(WRITING));
-        !writes && is_from_here(target.or(header(HOST)), header(ORIGIN), self.page_port)
+        !writes && is_from_here(header, self.page_port)
     }
 }
 

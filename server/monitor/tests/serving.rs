@@ -145,6 +145,9 @@ fn a_page_from_elsewhere_reaches_neither_port_and_nobody_writes_into_the_stream(
                 "{path} {origin}"
             );
         }
+        // A picture or a frame in such a page, which the browser does not name.
+        let part = format!("Host: {address}\r\nSec-Fetch-Site: cross-site\r\n{web}");
+        assert_eq!(status(address, method, path, &part), "403", "{path}");
     }
     let own = format!("Host: {stream}\r\nOrigin: http://{page}\r\n{web}");
     assert_eq!(
