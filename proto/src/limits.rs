@@ -161,7 +161,7 @@ impl<S: BuildHasher> UnknownSources<S> {
     }
 }
 
-/// Limits of joining, per address.
+/// Limits of joining, per address: all who share one share them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JoinLimits {
     /// Attempts.

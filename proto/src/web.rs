@@ -1,25 +1,30 @@
 //! Whether a browser's request comes from a page of this very server: the guard before everything that speaks HTTP here.
 //!
-//! A page from anywhere, opened in a browser on this machine or on one that a tunnel leads to, can send requests to the loopback address. Two
-//! things tell it from our own page, and a page cannot choose either: the name that the server was asked by (`Host`: by rebinding its
-//! own name to this address, a page from elsewhere becomes of one origin with us), and the page that asks (`Origin`).
+//! A page from anywhere, opened in a browser on this machine or on one that a tunnel leads to, can send requests to the loopback address. Three
+//! things tell it from our own page, and a page cannot choose any: the name that the server was asked by (`Host`: by rebinding its
+//! own name to this address, a page from elsewhere becomes of one origin with us), the page that asks (`Origin`), and, where a browser names none, as
+//! for a picture or a frame, whether that is of another site (`Sec-Fetch-Site`, which browsers send to the loopback address and to HTTPS).
 
 use std::net::IpAddr;
 
-/// Whether a request may be answered that names the server `host` (`name:port`) and was made by a page of `origin`, if by a page.
+/// Whether a request may be answered; `header` gives what it says under a name, which is in lower case.
 ///
 /// The server must be asked by address or as `localhost`. A page must be the server's own: of the same origin, or, with `page_port`,
-/// from that port under the same name; all names of the loopback address count as one.
+/// from that port under the same name; all names of the loopback address count as one. Whatever page a person comes from, he may open one here.
 #[must_use]
-pub fn is_from_here(host: Option<&str>, origin: Option<&str>, page_port: Option<u16>) -> bool {
-    let Some(host) = host else {
-        return origin.is_none(); // a script of HTTP/1.0
-    };
-    let Some((name, port)) = authority(host) else {
+pub fn is_from_here<'a>(header: impl Fn(&str) -> Option<&'a str>, page_port: Option<u16>) -> bool {
+    let host = header("host");
+    let asked = host.and_then(authority);
+    if host.is_some() && asked.is_none() {
         return false;
+    }
+    let Some(origin) = header("origin") else {
+        let site = header("sec-fetch-site"); // programs say nothing
+        let is_opened = header("sec-fetch-dest") == Some("document"); // in a window of its own, not within a page
+        return matches!(site, None | Some("same-origin" | "none")) || is_opened;
     };
-    let Some(origin) = origin else {
-        return true;
+    let Some((name, port)) = asked else {
+        return false; // a script of HTTP/1.0 has no page
     };
     let Some((page, from)) = origin.strip_prefix("http://").and_then(authority) else {
         return false;
@@ -53,6 +58,15 @@ mod tests {
     use proptest::prelude::*;
 
     const HERE: Option<&str> = Some("127.0.0.1:9876");
+
+    fn is_from_here(host: Option<&str>, origin: Option<&str>, page_port: Option<u16>) -> bool {
+        let header = |name: &str| match name {
+            "host" => host,
+            "origin" => origin,
+            _ => None,
+        };
+        super::is_from_here(header, page_port)
+    }
 
     #[test]
     fn own_pages_and_programs_may_ask() {
@@ -114,6 +128,34 @@ mod tests {
             "of another port"
         );
         assert!(!is_from_here(None, Some("http://127.0.0.1:9876"), None));
+    }
+
+    #[test]
+    fn a_part_of_a_page_from_elsewhere_that_is_not_named_is_refused() {
+        let asks = |origin: Option<&str>, site: &str, dest: &str| {
+            let header = |name: &str| match name {
+                "host" => HERE,
+                "origin" => origin,
+                "sec-fetch-site" => Some(site),
+                "sec-fetch-dest" => Some(dest),
+                _ => None,
+            };
+            super::is_from_here(header, Some(9090))
+        };
+        for site in ["cross-site", "same-site", "", "SAME-ORIGIN"] {
+            for dest in ["image", "script", "iframe", "object", "empty", ""] {
+                assert!(!asks(None, site, dest), "{site} {dest}");
+            }
+        }
+        assert!(asks(None, "same-origin", "image"), "our own page");
+        assert!(asks(None, "none", "document"), "typed");
+        assert!(
+            asks(None, "cross-site", "document"),
+            "a link that is followed"
+        );
+        // Where the page is named its name counts.
+        assert!(asks(Some("http://127.0.0.1:9090"), "same-site", "empty"));
+        assert!(!asks(Some("http://evil.example"), "same-origin", "empty"));
     }
 
     proptest! {

@@ -109,7 +109,7 @@ counters! {
         shut_out,
         /// Attempts to join that were turned away before TLS: too many, too soon after wrong proofs, or too many at once.
         turned_away,
-        /// Attempts to join that first had to prove their address.
+        /// First packets of addresses that had to prove that they receive: one of each join, and those of forged addresses.
         address_checks,
         /// Attempts to join that lost their place to somebody else's before they had proven anything.
         crowded_out,

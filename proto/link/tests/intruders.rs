@@ -3,7 +3,7 @@
 use crate::support::*;
 use ring::digest::{SHA256, digest};
 use std::{
-    net::SocketAddr,
+    net::{SocketAddr, UdpSocket},
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -360,6 +360,60 @@ async fn many_attempts_at_once_must_prove_their_address_and_are_bounded() {
     for task in silent {
         task.abort();
     }
+}
+
+/// The first packet of an attempt to join `server`, kept from it.
+fn first_packet(server: &ServerLink) -> Vec<u8> {
+    let local = SocketAddr::from(([127, 0, 0, 1], 0));
+    let heard = must(UdpSocket::bind(local));
+    must(heard.set_read_timeout(Some(PATIENCE)));
+    let pinned = Arc::new(PinnedServer::new(server.pin()));
+    let config = must(transport::client_config(pinned, Duration::from_secs(5)));
+    let endpoint = must(quinn::Endpoint::client(local));
+    let joining = must(endpoint.connect_with(config, must(heard.local_addr()), "taut"));
+    let mut packet = vec![0; 2048];
+    let length = must(heard.recv(&mut packet));
+    packet.truncate(length);
+    drop(joining);
+    packet
+}
+
+/// Whoever names a node's address as his own hears no answer, and uses up nothing of what that address may do.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn first_packets_under_a_node_s_address_do_not_keep_it_out() {
+    const PACKETS: u64 = 16;
+    let server = server_with(ServerOptions {
+        limits: FloodLimits {
+            joins: JoinLimits {
+                attempts: Rate {
+                    per_second: 1,
+                    burst: 4,
+                },
+                ..JoinLimits::default()
+            },
+            ..FloodLimits::default()
+        },
+        idle_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let forger = must(UdpSocket::bind(SocketAddr::from(([127, 0, 0, 1], 0))));
+    for _ in 0..PACKETS {
+        must(forger.send_to(&first_packet(&server), server.quic_addr()));
+    }
+    wait_until("an end of each packet", || {
+        let counters = server.counters();
+        counters.address_checks + counters.turned_away + 4 >= PACKETS
+    })
+    .await;
+    assert_eq!(server.counters().turned_away, 0, "its attempts are used up");
+    client(&server, Role::Render, "left").await.close().await;
+    let counters = server.counters();
+    assert_eq!(counters.turned_away, 0);
+    assert!(
+        counters.address_checks > PACKETS,
+        "its own was checked, too"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

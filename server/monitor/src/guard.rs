@@ -3,11 +3,12 @@
 use std::task::{Context, Poll};
 
 use futures_util::future::{Either, Ready, ready};
-use http::header::{HOST, HeaderName, ORIGIN};
 use http::{Request, Response, StatusCode};
 use taut_proto::web::is_from_here;
 use tower_layer::Layer;
 use tower_service::Service;
+
+use crate::guests::Place;
 
 /// Begin of the names of the stream's methods by which a client would put something into it.
 const WRITING: &str = "Write";
@@ -21,20 +22,24 @@ pub(crate) struct Guard {
 
 impl Guard {
     fn lets_through<B>(self, request: &Request<B>) -> bool {
-        let header = |name: HeaderName| {
+        let said = |name: &str| {
             let value = request.headers().get(name)?;
             // What is no text is no address either.
             Some(value.to_str().unwrap_or("?"))
         };
         // HTTP/2 names the server in the request's target.
         let target = request.uri().authority().map(http::uri::Authority::as_str);
+        let header = |name: &str| match name {
+            "host" => target.or_else(|| said(name)),
+            name => said(name),
+        };
         let writes = request
             .uri()
             .path()
             .rsplit('/')
             .next()
             .is_some_and(|method| method.starts_with(WRITING));
-        !writes && is_from_here(target.or(header(HOST)), header(ORIGIN), self.page_port)
+        !writes && is_from_here(header, self.page_port)
     }
 }
 
@@ -71,6 +76,9 @@ where
 
     fn call(&mut self, request: Request<B>) -> Self::Future {
         if self.guard.lets_through(&request) {
+            if let Some(place) = request.extensions().get::<Place>() {
+                place.leave();
+            }
             return Either::Left(self.inner.call(request));
         }
         let mut refusal = Response::new(R::default());

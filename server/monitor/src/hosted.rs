@@ -8,6 +8,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::body::Bytes;
 use axum::response::IntoResponse;
 use futures_util::stream::{Stream, StreamExt as _, empty};
 use http::{StatusCode, Uri, header};
@@ -26,11 +27,11 @@ use rerun::sink::{LogSink, SinkFlushError};
 use tokio::sync::watch;
 use tonic::service::Routes;
 use tonic::transport::Server;
-use tonic::transport::server::TcpIncoming;
 use tonic::{Request, Response, Status, Streaming};
 
 use crate::error::MonitorError;
 use crate::guard::Guard;
+use crate::guests::incoming;
 use crate::history::History;
 
 /// Pings by which a client that is gone without a word is found.
@@ -137,15 +138,36 @@ async fn serve_page(
     Ok(())
 }
 
-/// A file of the viewer.
-fn file(viewer: &WebViewerData, path: &str) -> axum::response::Response {
+/// One of the viewer's files.
+type Pick = fn(&WebViewerData) -> &[u8];
+
+/// A file of the viewer where it is: one has 42 MB, and who asks for it need not take it.
+struct InPlace {
+    viewer: Arc<WebViewerData>,
+    pick: Pick,
+}
+
+impl AsRef<[u8]> for InPlace {
+    fn as_ref(&self) -> &[u8] {
+        (self.pick)(&self.viewer)
+    }
+}
+
+/// A file of the viewer, not copied.
+fn file(viewer: &Arc<WebViewerData>, path: &str) -> axum::response::Response {
+    let in_place = |pick: Pick| {
+        Bytes::from_owner(InPlace {
+            viewer: viewer.clone(),
+            pick,
+        })
+    };
     let (kind, bytes) = match path {
-        "/" | "/index.html" => ("text/html", viewer.index_html()),
-        "/favicon.ico" => ("image/x-icon", viewer.favicon()),
-        "/apple-touch-icon.png" => ("image/png", viewer.apple_touch_icon()),
-        "/sw.js" => ("text/javascript", viewer.sw_js()),
-        "/re_viewer.js" => ("text/javascript", viewer.viewer_js()),
-        "/re_viewer_bg.wasm" => ("application/wasm", viewer.viewer_wasm()),
+        "/" | "/index.html" => ("text/html", in_place(WebViewerData::index_html)),
+        "/favicon.ico" => ("image/x-icon", in_place(WebViewerData::favicon)),
+        "/apple-touch-icon.png" => ("image/png", in_place(WebViewerData::apple_touch_icon)),
+        "/sw.js" => ("text/javascript", in_place(WebViewerData::sw_js)),
+        "/re_viewer.js" => ("text/javascript", in_place(WebViewerData::viewer_js)),
+        "/re_viewer_bg.wasm" => ("application/wasm", in_place(WebViewerData::viewer_wasm)),
         _ => return StatusCode::NOT_FOUND.into_response(),
     };
     // The page's progress bar asks for a length by a name of its own.
@@ -153,12 +175,7 @@ fn file(viewer: &WebViewerData, path: &str) -> axum::response::Response {
         header::HeaderName::from_static("rerun-final-length"),
         bytes.len().to_string(),
     );
-    ([(header::CONTENT_TYPE, kind)], [length], bytes.to_vec()).into_response()
-}
-
-fn incoming(socket: TcpListener) -> std::io::Result<TcpIncoming> {
-    let listener = tokio::net::TcpListener::from_std(socket)?;
-    Ok(TcpIncoming::from(listener).with_nodelay(Some(true)))
+    ([(header::CONTENT_TYPE, kind)], [length], bytes).into_response()
 }
 
 async fn end(mut stopped: watch::Receiver<()>) {
@@ -231,5 +248,28 @@ impl LogSink for Hosted {
 
     fn flush_blocking(&self, _timeout: Duration) -> Result<(), SinkFlushError> {
         Ok(()) // Observers get what they get: nothing here may wait for them.
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_the_page_is_copied_for_nobody() {
+        let viewer = WebViewerData::load(None).expect("it is built in");
+        let viewer = Arc::new(viewer);
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .build()
+            .expect("a runtime");
+        for (path, whole) in [
+            ("/", viewer.index_html()),
+            ("/re_viewer_bg.wasm", viewer.viewer_wasm()),
+        ] {
+            let body = file(&viewer, path).into_body();
+            let body = runtime.block_on(axum::body::to_bytes(body, usize::MAX));
+            let body = body.expect("a body");
+            assert_eq!(body.as_ptr_range(), whole.as_ptr_range(), "{path}");
+        }
     }
 }

@@ -11,6 +11,7 @@
 mod colours;
 mod error;
 mod guard;
+mod guests;
 mod history;
 mod hosted;
 mod inspect;

@@ -1,6 +1,6 @@
 //! The page and the stream are there while the monitor runs, and an occupied port is an error.
 
-use std::io::{Read as _, Write as _};
+use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
@@ -145,6 +145,9 @@ fn a_page_from_elsewhere_reaches_neither_port_and_nobody_writes_into_the_stream(
                 "{path} {origin}"
             );
         }
+        // A picture or a frame in such a page, which the browser does not name.
+        let part = format!("Host: {address}\r\nSec-Fetch-Site: cross-site\r\n{web}");
+        assert_eq!(status(address, method, path, &part), "403", "{path}");
     }
     let own = format!("Host: {stream}\r\nOrigin: http://{page}\r\n{web}");
     assert_eq!(
@@ -162,6 +165,45 @@ fn a_page_from_elsewhere_reaches_neither_port_and_nobody_writes_into_the_stream(
     );
     // Whoever may look on may not make others see what is not.
     assert_eq!(status(&stream, "POST", &write, &own), "403");
+    monitor.stop().unwrap();
+}
+
+/// Of 64 places, one address may have 16; whoever has asked is not among them.
+#[test]
+fn silent_connections_to_both_ports_lose_their_places_to_newcomers() {
+    let scene = MonitorScene::new("empty");
+    let (monitor, _sender) = Monitor::start(&on_free_ports(), scene).unwrap();
+    let page = host_of(monitor.address().unwrap()).to_owned();
+    let stream = host_of(monitor.stream_address().unwrap()).to_owned();
+    let mut held = Vec::new();
+    for address in [&page, &stream] {
+        let mut silent: Vec<_> = (0..40)
+            .map(|number| {
+                let mut connection = TcpStream::connect(address).unwrap();
+                if number % 2 == 1 {
+                    // Half a request is none.
+                    write!(connection, "GET / HTTP/1.1\r\n").unwrap();
+                }
+                connection
+            })
+            .collect();
+        for connection in &mut silent[..20] {
+            connection
+                .set_read_timeout(Some(Duration::from_secs(20)))
+                .unwrap();
+            match connection.read(&mut [0; 16]) {
+                Ok(length) => assert_eq!(length, 0, "closed without an answer"),
+                Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
+            }
+        }
+        held.extend(silent);
+    }
+    let asks = "Access-Control-Request-Method: POST\r\n";
+    let own = format!("Host: {stream}\r\nOrigin: http://{page}\r\n{asks}");
+    let read = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
+    assert_eq!(status(&stream, "OPTIONS", read, &own), "200");
+    let own = format!("Host: {page}\r\n");
+    assert_eq!(status(&page, "GET", "/", &own), "200");
     monitor.stop().unwrap();
 }
 

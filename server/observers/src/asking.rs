@@ -3,10 +3,13 @@
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use taut_proto::waiting::{Ticket, Waiting};
 use tokio::sync::oneshot;
 
+/// Longest that somebody may take for a request.
+pub const REQUEST_TIME: Duration = Duration::from_secs(2);
 /// Clients that may be asking at once.
 const MAX_ASKING: usize = 64;
 /// The same of one address: a browser asks for a page on some six connections.
@@ -16,17 +19,17 @@ type Places = Arc<Mutex<Waiting<oneshot::Sender<()>>>>;
 
 /// The places of one server.
 #[derive(Clone, Debug)]
-pub(crate) struct Entrance {
+pub struct Entrance {
     places: Places,
     crowded_out: Arc<AtomicU64>,
 }
 
 /// A place to ask from; dropped, it is free again. Whoever takes it ends `lost`.
-pub(crate) struct Asking {
+pub struct Asking {
     places: Places,
     ticket: Ticket,
     /// Done when the place is another's.
-    pub(crate) lost: oneshot::Receiver<()>,
+    pub lost: oneshot::Receiver<()>,
 }
 
 impl Default for Entrance {
@@ -39,8 +42,8 @@ impl Default for Entrance {
 }
 
 impl Entrance {
-    /// A place to ask from; whoever asks longest of the address that asks most gives it up where there is none.
-    pub(crate) fn ask(&self, peer: SocketAddr) -> Asking {
+    /// A place for `peer` to ask from, by [`REQUEST_TIME`]; whoever asks longest of the address that asks most gives it up where there is none.
+    pub fn ask(&self, peer: SocketAddr) -> Asking {
         let (place, lost) = oneshot::channel();
         let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
         let (ticket, loser) = places.enter(peer.ip(), place);
@@ -55,7 +58,7 @@ impl Entrance {
     }
 
     /// How many lost their place before they had asked.
-    pub(crate) fn crowded_out(&self) -> u64 {
+    pub fn crowded_out(&self) -> u64 {
         self.crowded_out.load(Ordering::Relaxed)
     }
 }

@@ -10,8 +10,6 @@ use tokio::time::timeout;
 
 use crate::request::MAX_REQUEST_BYTES;
 
-/// Longest that somebody may take for a request.
-pub(crate) const REQUEST_TIME: Duration = Duration::from_secs(2);
 /// Longest that somebody may take nothing of what is sent.
 pub(crate) const SEND_TIME: Duration = Duration::from_secs(5);
 /// Sentences for people.

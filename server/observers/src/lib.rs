@@ -10,10 +10,10 @@
 //! their own, and nothing that their clients send goes anywhere: whoever is connected there can look and can do nothing else.
 //! Clients are bounded in number and in what waits for them; one that does not keep up misses states or is dropped.
 //!
-//! Without the feature `servers` there are the feed and the lines alone.
+//! Without the feature `servers` there are the feed and the lines alone, and with `entrance` the places of those who have asked for nothing yet.
 #![forbid(unsafe_code)]
 
-#[cfg(feature = "servers")]
+#[cfg(feature = "entrance")]
 mod asking;
 mod event_lines;
 mod feed;
@@ -37,6 +37,8 @@ mod vrpn_reports;
 #[cfg(feature = "servers")]
 mod vrpn_server;
 
+#[cfg(feature = "entrance")]
+pub use asking::{Asking, Entrance, REQUEST_TIME};
 pub use event_lines::EventLines;
 pub use feed::{Fresh, MAX_WAITING, StateFeed, StateOutlet, state_channel};
 pub use lines::{Hello, Naming};

@@ -135,7 +135,7 @@ pub(crate) fn read(head: &[u8], token: &str) -> Option<Result<Call, Refusal>> {
 }
 
 fn judge(request: &httparse::Request<'_, '_>, begins: usize, token: &str) -> Result<Call, Refusal> {
-    if !is_from_here(header(request, "Host"), header(request, "Origin"), None) {
+    if !is_from_here(|name| header(request, name), None) {
         return Err(Refusal::Foreign);
     }
     let target = request.path.unwrap_or_default();
@@ -245,6 +245,7 @@ mod tests {
             format!("{shown}Origin: http://evil.example\r\n"),
             format!("{shown}Origin: http://127.0.0.1:4860\r\n"),
             format!("{shown}Origin: null\r\n"),
+            format!("{shown}Sec-Fetch-Site: cross-site\r\nSec-Fetch-Dest: image\r\n"),
             format!("Host: rebound.example:4861\r\n{SHOWN}"),
         ] {
             for line in ["POST /arm", "POST /disarm", "POST /token", "GET /stream"] {

@@ -24,10 +24,8 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, watch};
 use tokio::time::{Instant, sleep, timeout};
 
-use crate::asking::{Asking, Entrance};
-use crate::http::{
-    End, HTML, JSON_LINES, Lines, REQUEST_TIME, TEXT, answer, body, head, request, send,
-};
+use crate::asking::{Asking, Entrance, REQUEST_TIME};
+use crate::http::{End, HTML, JSON_LINES, Lines, TEXT, answer, body, head, request, send};
 use crate::operator_request::{Call, Deed, Refusal, read};
 use crate::service::{ACCEPT_PAUSE, Service, listen, runtime};
 

@@ -114,7 +114,7 @@ fn judge(request: &httparse::Request<'_, '_>, token: Option<&str>) -> Result<Wis
                 return Err(Refusal::Token);
             }
         }
-        None if !is_from_here(header("Host"), header("Origin"), None) => {
+        None if !is_from_here(header, None) => {
             return Err(Refusal::Foreign);
         }
         None => {}
@@ -175,6 +175,7 @@ mod tests {
             format!("{HERE}Origin: http://evil.example\r\n"),
             format!("{HERE}Origin: null\r\n"),
             format!("{HERE}Origin: https://127.0.0.1:4859\r\n"),
+            format!("{HERE}Sec-Fetch-Site: cross-site\r\nSec-Fetch-Dest: image\r\n"),
             "Host: rebound.example:4859\r\n".to_owned(),
             "Origin: http://evil.example\r\n".to_owned(),
         ] {

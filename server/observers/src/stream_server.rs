@@ -21,12 +21,10 @@ use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 use tokio_tungstenite::tungstenite::{Message, Utf8Bytes};
 
-use crate::asking::{Asking, Entrance};
+use crate::asking::{Asking, Entrance, REQUEST_TIME};
 use crate::event_lines::EventLines;
 use crate::feed::StateFeed;
-use crate::http::{
-    End, HTML, JSON_LINES, Lines, REQUEST_TIME, SEND_TIME, TEXT, answer, head, request, send,
-};
+use crate::http::{End, HTML, JSON_LINES, Lines, SEND_TIME, TEXT, answer, head, request, send};
 use crate::lines::{Hello, Naming, missed_line, state_line};
 use crate::request::{Refusal, Wish, read};
 use crate::service::{ACCEPT_PAUSE, Service, listen, runtime};

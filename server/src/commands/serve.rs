@@ -29,6 +29,7 @@ pub(super) fn run(
     args: &ServeArgs,
     terminal: &Terminal,
 ) -> Result<(SessionReport, Option<Failure>), Failure> {
+    let mut admission = AdmissionWatch::new(&args.config);
     let workbench = load_workbench(args)?;
     taut_log::use_directives(&directives(workbench.log));
     let mut metrics = MetricsOutlets::open(args)?;
@@ -50,6 +51,7 @@ pub(super) fn run(
     let begun = Instant::now();
     loop {
         scene.begin(&mut next);
+        admission.begin(&mut next.setup.link.policy);
         let mut session = Session::start_with(next.setup, &mut kept)?;
         session.end_with(&end);
         scene.began(&session);
@@ -61,7 +63,6 @@ pub(super) fn run(
         if let Some(directory) = &args.recording {
             terminal.say(&recording_size::sentence(directory));
         }
-        let mut admission = AdmissionWatch::new(&args.config);
         let left = args
             .duration
             .map(|s| (s - begun.elapsed().as_secs_f64()).max(0.0));

@@ -30,9 +30,6 @@ use taut_proto::{
 };
 use tokio::time::{sleep, timeout};
 
-/// Clients joining at once above which an address must first prove that it receives what is sent to it (QUIC Retry): whoever names the
-/// addresses of others cannot keep them out.
-const CHECK_ADDRESSES_ABOVE: usize = 8;
 /// Time for a client to join.
 const JOIN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Time for a refused client to read why.
@@ -54,12 +51,14 @@ const STALL_TIMEOUT: Duration = Duration::from_secs(10);
 const MAX_HELLO_BYTES: usize = 1024;
 
 /// Lets clients in until the endpoint closes.
+///
+/// An address first proves that it receives what is sent to it (QUIC Retry), and counts for the limits from then on: whoever names the addresses of
+/// others uses up nothing of theirs.
 pub(crate) async fn run(shared: Arc<Shared>, endpoint: quinn::Endpoint) {
     while let Some(incoming) = endpoint.accept().await {
-        let busy = lock(&shared.waiting).len() >= CHECK_ADDRESSES_ABOVE;
-        if busy && !incoming.remote_address_validated() && incoming.may_retry() {
+        if !incoming.remote_address_validated() {
             shared.counters.address_checks.one();
-            let _ = incoming.retry(); // fails only where it may not be asked for
+            let _ = incoming.retry(); // fails only for an address that has proven itself
             continue;
         }
         let Some((attempt, lost)) = Joining::begin(&shared, incoming.remote_address().ip()) else {

@@ -26,7 +26,7 @@ pub(super) const ATTACKS: &[Attack] = &[
     },
     Attack {
         name: "page-from-elsewhere",
-        tried: "requests to the observers' port by rebound names and from pages of other origins, also for /metrics",
+        tried: "requests to the observers' port by rebound names and from pages of other origins and parts of such, also for /metrics",
         promised: "403 for each, nothing told",
         run: page_from_elsewhere,
     },
@@ -172,6 +172,8 @@ fn page_from_elsewhere(_: &Extent) -> Result<Finding, BenchError> {
                 address.port() ^ 1
             ),
             format!("Host: {address}\r\nOrigin: null"),
+            // A picture in a page, which the browser does not name.
+            format!("Host: {address}\r\nSec-Fetch-Site: cross-site\r\nSec-Fetch-Dest: image"),
         ] {
             let answer = get(address, target, &headers)?;
             asked += 1;
