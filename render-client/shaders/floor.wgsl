@@ -1,5 +1,8 @@
 // A grid under the obstacles that takes their shadow: height above it is read from the shadow.
 // It fades out into the surroundings at its rim, so that it has no edge of its own. They are mixed in here and not behind it: no pixel is drawn twice.
+// Where nothing of it is seen it hides nothing: neither there nor from below, where the pipeline does not draw it.
+
+const UNSEEN = 0.005; // share of it that changes 8-bit colours by half a step at most
 
 struct Fragment {
     @builtin(position) clip: vec4<f32>,
@@ -39,10 +42,13 @@ fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     let from_middle = distance(in.position.xy, frame.floor.xy) / frame.floor.w;
     let place = in.position.xy - frame.floor.xy;
     let line = max(0.35 * lines(place, 0.2 * frame.grid.x, 0.012 * frame.grid.x), lines(place, frame.grid.x, 0.028 * frame.grid.x));
+    let share = (1.0 - smoothstep(0.35, 1.0, from_middle)) * near_share(in.clip);
+    if share < UNSEEN {
+        discard; // after the derivatives in lines()
+    }
     let normal = vec3(0.0, 0.0, 1.0);
     let colour = mix(vec3(0.045, 0.051, 0.062), vec3(0.22, 0.25, 0.29), 0.45 * line);
     let light = colour * falling_light(in.position, normal).rgb;
-    let share = (1.0 - smoothstep(0.35, 1.0, from_middle)) * near_share(in.clip);
     let behind = surroundings(normalize(in.position - frame.eye.xyz), in.clip.xy);
     return vec4(mix(behind, shown(light), share), 1.0);
 }

@@ -99,7 +99,16 @@ impl Calibration {
 
     /// Shows the pictures in the node's windows until Esc, a closed window or a signal. Wants the main thread.
     pub fn show(&self, windows: &CalibrationWindows) -> Result<(), RenderError> {
-        still::show(&self.stage, &self.node, windows)
+        still::show(&self.in_windows(), &self.node, windows)
+    }
+
+    /// The stage for windows, which are as large as the picture; files are measured by one eye's view.
+    fn in_windows(&self) -> Stage {
+        let mut stage = self.stage.clone();
+        for screen in &mut stage.screens {
+            screen.pixels = screen.stereo.picture_size(screen.pixels);
+        }
+        stage
     }
 }
 
@@ -112,4 +121,38 @@ fn speck() -> Result<MeshBlob, RenderError> {
             what: error.to_string(),
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taut_proto::scene::{NodeDescription, ScreenDescription, Stereo, WindowDescription};
+
+    #[test]
+    fn windows_are_as_large_as_the_workbench_file_says_in_any_stereo_mode() {
+        for (_, stereo) in Stereo::NAMED {
+            let mut workbench = SceneDescription::of_body("nothing", Calibration::body());
+            workbench.screens.push(ScreenDescription {
+                name: "front".into(),
+                lower_left: [-0.9, 0.0, 0.0],
+                lower_right: [0.9, 0.0, 0.0],
+                upper_left: [-0.9, 0.0, 1.2],
+                output: Default::default(),
+            });
+            workbench.nodes.push(NodeDescription {
+                name: "wall".into(),
+                screens: vec!["front".into()],
+                stereo,
+                window: WindowDescription {
+                    width: 1920,
+                    height: 1080,
+                    fullscreen: false,
+                },
+                monitors: Vec::new(),
+            });
+            let calibration = Calibration::new(&workbench, "wall", Path::new(""));
+            let stage = calibration.expect("a node").in_windows();
+            assert_eq!(stage.screens[0].pixels, (1920, 1080), "{stereo:?}");
+        }
+    }
 }

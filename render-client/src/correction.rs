@@ -56,7 +56,7 @@ impl Default for Correction {
 
 impl Correction {
     /// What the workbench file says, with its files from `folder`; `None` where it says nothing. `aspect`: width over height of
-    /// the window.
+    /// the window that it asks for; the one that opens may have another.
     pub fn read(
         described: &OutputDescription,
         folder: &Path,
@@ -217,7 +217,7 @@ pub fn clip_from_target(
 mod tests {
     use super::*;
     use crate::view::project;
-    use taut_screens::OutputNode;
+    use taut_screens::{Across, OutputNode};
 
     const PLANES: ClipPlanes = ClipPlanes {
         near: 0.02,
@@ -241,6 +241,7 @@ mod tests {
         };
         OutputMesh {
             target: Target::Surface,
+            across: Across::Width,
             columns,
             rows,
             nodes: (0..columns * rows).map(node).collect(),

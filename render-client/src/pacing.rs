@@ -285,6 +285,42 @@ mod tests {
         }
     }
 
+    /// A tracker of 100 Hz beats with the frames: a head's age is another in each of them. Told with the report's own time it is predicted
+    /// within the bound for the time from the oldest report to the light.
+    #[test]
+    fn a_head_in_steps_is_predicted_by_the_times_of_its_reports() {
+        const REPORTS_NS: u64 = 10 * MS;
+        const PLANNED_NS: u64 = 8 * MS;
+        let worst = |read_ns: fn(u64) -> u64, told_ns: fn(u64) -> u64| {
+            let mut heads = heads();
+            let errors = (0..120).map(|frame| {
+                let mut state = released(frame);
+                let (read_ns, told_ns) = (read_ns(state.time_ns), told_ns(state.time_ns));
+                state.head = Some(Head {
+                    pose: Isometry3::translation(place(read_ns), -1.3, 0.9),
+                    eye_separation: 0.064,
+                    sample_ns: told_ns,
+                });
+                let planned_ns = state.time_ns + PLANNED_NS;
+                let head = heads.of_frame(&state, planned_ns).expect("tracked");
+                (head.pose.translation.x - place(planned_ns + DISPLAY_NS)).abs()
+            });
+            errors.skip(4).fold(0.0, f64::max)
+        };
+        let reported = |now_ns: u64| now_ns / REPORTS_NS * REPORTS_NS;
+        let bound = |horizon_ns: u64| {
+            let horizon = horizon_ns as f64 * 1e-9;
+            AMPLITUDE * RATE * RATE * horizon * (horizon + 0.040) / 2.0
+        };
+        let ahead = PLANNED_NS + DISPLAY_NS;
+        let continuous = worst(|now_ns| now_ns, |now_ns| now_ns);
+        assert!(continuous <= bound(ahead), "{continuous} m");
+        let in_steps = worst(reported, reported);
+        assert!(in_steps <= bound(ahead + REPORTS_NS), "{in_steps} m");
+        let as_if_now = worst(reported, |now_ns| now_ns);
+        assert!(as_if_now > 3.0 * in_steps, "{as_if_now} m, {in_steps} m");
+    }
+
     #[test]
     fn a_head_that_is_not_tracked_any_more_is_not_drawn_for() {
         let mut heads = heads();

@@ -320,6 +320,62 @@ fn a_body_throws_its_shadow_onto_what_lies_behind_it_as_seen_from_the_light() {
     assert!(dark > 10.0, "a shadow is not black: {dark}");
 }
 
+/// A grey box at `place`, which the floor is under, and an orange ball of 60 mm in the hand.
+fn box_and_ball(place: Isometry3<f64>) -> Stage {
+    let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
+    stage.workbench_from_scene = Similarity3::identity();
+    stage.meshes = vec![
+        shapes::sphere(0.06, 32).into(),
+        shapes::cuboid([0.09; 3]).into(),
+    ];
+    stage.obstacles = vec![StageBody {
+        pose: place,
+        ..stage.obstacles[0]
+    }];
+    stage
+}
+
+/// The floor is a square whose side is 9 radii of the box, and fades out to a circle in it.
+#[test]
+fn a_body_below_the_floor_is_seen_where_the_floor_is_not() {
+    let middle = Point3::new(0.0, -0.6, -0.1);
+    let reach = 4.5 * 0.09 * 3f64.sqrt();
+    for (share, is_seen) in [(0.2, false), (0.85, true)] {
+        let mut stage = box_and_ball(Isometry3::from(middle.coords));
+        stage.screens.remove(0);
+        stage.head = Isometry3::translation(0.0, -0.6, 1.2);
+        let eye = Point3::from(stage.head.translation.vector);
+        // Behind a place on the floor's diagonal, as the eye sees it.
+        let on_floor = middle + Vector3::new(share * reach, share * reach, -0.0907);
+        let ball = eye + 1.1 * (on_floor - eye);
+        let expected = pixel_of(&stage, 0, Eye::Middle, ball);
+        let at = state(Isometry3::from(ball.coords));
+        let Some(pictures) = draw(stage, &at, Show::default()) else {
+            return;
+        };
+        let (across, down, count) = orange(&pictures[0]);
+        if is_seen {
+            assert!(count > 100, "{count} orange pixels");
+            assert!((across - expected.0).abs() < 5.0 && (down - expected.1).abs() < 5.0);
+        } else {
+            assert_eq!(count, 0);
+        }
+    }
+}
+
+#[test]
+fn an_eye_below_the_floor_sees_what_stands_on_it() {
+    let mut stage = box_and_ball(Isometry3::translation(0.0, 0.3, 0.6));
+    stage.screens.truncate(1);
+    stage.head = Isometry3::translation(0.0, -1.2, 0.1);
+    let at = state(Isometry3::translation(0.3, 0.3, 0.62));
+    let Some(pictures) = draw(stage, &at, Show::default()) else {
+        return;
+    };
+    let (_, _, count) = orange(&pictures[0]);
+    assert!(count > 100, "{count} orange pixels");
+}
+
 #[test]
 fn only_the_god_object_is_drawn_unless_more_is_asked_for() {
     let mut latched = state(Isometry3::translation(0.0, 0.1, 0.6));

@@ -273,15 +273,40 @@ fn on_a_cylinder_a_point_is_seen_where_it_is_from_every_head() {
     }
 }
 
+/// Paul Bourke's mesh of four nodes, read for an output of this aspect ratio: the whole picture to `x` and `y` each way from the middle.
+fn square(x: f64, y: f64, aspect: f64) -> OutputMesh {
+    let text = format!("2\n2 2\n-{x} -{y} 0 0 1\n{x} -{y} 1 0 1\n-{x} {y} 0 1 1\n{x} {y} 1 1 1\n");
+    let (_keep, path) = written("square.data", text.as_bytes());
+    read_warp(&path, aspect).expect("a mesh")
+}
+
+/// The workbench file asks for a window of 3 to 2; the one that opens is 16 to 9, as the mesh is.
+#[test]
+fn a_mesh_fits_the_window_that_opens_not_the_one_asked_for() {
+    let pixels = (320, 180);
+    let mesh = square(16.0 / 9.0, 1.0, 1.5);
+    let pose = Isometry3::translation(0.0, -0.042, 0.0);
+    let Some(plain) = plain(pixels, Stereo::Mono, pose) else {
+        return;
+    };
+    let mut stage = peg_in_hole(pixels, Stereo::Mono);
+    meshes(&mut stage, std::slice::from_ref(&mesh));
+    let corrected = draw(stage, pose).expect("drawn before");
+    for (plain, corrected) in plain.iter().zip(&corrected) {
+        let most = largest_difference(plain, corrected);
+        assert!(most <= 1, "{most} of 255");
+    }
+}
+
 #[test]
 fn views_that_share_a_picture_stay_in_their_parts_and_are_those_of_two_windows() {
-    // A mesh that reaches far beyond the output on all sides.
-    let mesh = "2\n2 2\n-2.5 -1.6 0 0 1\n2.5 -1.6 1 0 1\n-2.5 1.6 0 1 1\n2.5 1.6 1 1 1\n";
-    let (_keep, path) = written("beyond.data", mesh.as_bytes());
-    let mesh = read_warp(&path, 1.5).expect("a mesh");
-    let pictures = |stereo| {
+    let pictures = |stereo: Stereo| {
         let mut stage = peg_in_hole((180, 120), stereo);
         stage.screens.truncate(1);
+        // A mesh that reaches far beyond the output on all sides.
+        let (wide, high) = stereo.picture_size((180, 120));
+        let aspect = f64::from(wide) / f64::from(high);
+        let mesh = square(aspect * 5.0 / 3.0, 1.6, aspect);
         meshes(&mut stage, std::slice::from_ref(&mesh));
         draw(stage, Isometry3::translation(0.0, -0.042, 0.0))
     };

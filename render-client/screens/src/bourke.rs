@@ -8,7 +8,7 @@
 //! Source: P. Bourke, "Warping mesh format", <http://paulbourke.net/dataformats/meshwarp/>.
 
 use crate::fault::Unnamed;
-use crate::mesh::{OutputMesh, OutputNode, Target};
+use crate::mesh::{Across, OutputMesh, OutputNode, Target};
 
 /// Largest file, bytes.
 pub(crate) const MAX_BYTES: u64 = 1 << 26;
@@ -19,7 +19,8 @@ const ROUNDING: f64 = 1e-3;
 /// How far beyond the output a node may lie, in sizes of the output.
 const BEYOND: f64 = 1.0;
 
-/// Reads a mesh for an output of this aspect ratio, width over height; also says on which line each node is.
+/// Reads a mesh; also says on which line each node is. `aspect`: width over height of the output, as far as it is known; what lies far beyond it is
+/// refused.
 pub(crate) fn parse(text: &str, aspect: f64) -> Result<(OutputMesh, Vec<usize>), Unnamed> {
     let mut lines = text
         .lines()
@@ -51,6 +52,7 @@ pub(crate) fn parse(text: &str, aspect: f64) -> Result<(OutputMesh, Vec<usize>),
     }
     let mesh = OutputMesh {
         target: Target::Picture,
+        across: Across::HalfHeight,
         columns,
         rows,
         nodes,
@@ -110,8 +112,9 @@ fn node(line: &str, aspect: f64) -> Result<OutputNode, String> {
     let [Some(x), Some(y), Some(u), Some(v), Some(share)] = numbers[..] else {
         return Err("must have five finite numbers: x y u v i".to_owned());
     };
-    let place = [0.5 + 0.5 * x / aspect, 0.5 + 0.5 * y];
-    if place.iter().any(|p| !(-BEYOND..=1.0 + BEYOND).contains(p)) {
+    let up = 0.5 + 0.5 * y;
+    let shares = [0.5 + 0.5 * x / aspect, up];
+    if shares.iter().any(|p| !(-BEYOND..=1.0 + BEYOND).contains(p)) {
         return Err(format!(
             "has a node at ({x}, {y}), far beyond the output, which ends at ({aspect:.4}, 1); is its aspect ratio that of the window?"
         ));
@@ -128,7 +131,7 @@ fn node(line: &str, aspect: f64) -> Result<OutputNode, String> {
         ));
     }
     Ok(OutputNode {
-        place: place.map(|p| p as f32),
+        place: [x, up].map(|p| p as f32),
         target: [u.clamp(0.0, 1.0) as f32, v.clamp(0.0, 1.0) as f32, 0.0],
         share: share.min(1.0) as f32,
     })
@@ -147,9 +150,20 @@ mod tests {
             (mesh.columns, mesh.rows, &lines[..]),
             (2, 2, &[3, 4, 5, 6][..])
         );
-        assert_eq!(mesh.node(1, 0).place, [1.0, 0.0]);
+        assert_eq!(mesh.for_output(1.5).node(1, 0).place, [1.0, 0.0]);
         assert_eq!(mesh.node(0, 1).target, [0.0, 1.0, 0.0]);
         assert_eq!((mesh.node(0, 1).share, mesh.node(1, 1).share), (0.5, -1.0));
+    }
+
+    #[test]
+    fn a_mesh_keeps_its_shape_in_an_output_of_another_one() {
+        let (mesh, _) = parse(SQUARE, 1.5).expect("a mesh");
+        let wide = mesh.for_output(3.0);
+        assert_eq!(
+            [wide.node(0, 0).place, wide.node(1, 1).place],
+            [[0.25, 0.0], [0.75, 1.0]]
+        );
+        assert_eq!(wide.for_output(1.0), wide, "it is in shares now");
     }
 
     #[test]

@@ -47,7 +47,7 @@ pub fn file_name_fault(name: &str, endings: &[&str]) -> Option<String> {
 }
 
 /// Reads the warp of a flat screen: Paul Bourke's mesh, or a float map of u, v and anything. `aspect`: width over height
-/// of the output.
+/// of the output, as far as it is known: what lies far beyond it is refused. [`OutputMesh::for_output`] fits the mesh to the output.
 pub fn read_warp(path: &Path, aspect: f64) -> Result<OutputMesh, Fault> {
     let read = || {
         if ending_of(path) == "pfm" {
@@ -68,7 +68,11 @@ pub fn read_warp(path: &Path, aspect: f64) -> Result<OutputMesh, Fault> {
         let text = String::from_utf8(bytes)
             .map_err(|_| Unnamed::new("is no text; a warp is a .pfm map or Paul Bourke's mesh"))?;
         let (mesh, lines) = bourke::parse(&text, aspect)?;
-        unfolded(mesh, |_, node| (lines.get(node).copied(), String::new()))
+        let in_shares = mesh.for_output(aspect).into_owned();
+        unfolded(in_shares, |_, node| {
+            (lines.get(node).copied(), String::new())
+        })?;
+        Ok(mesh)
     };
     read().map_err(|fault| named(path, fault))
 }

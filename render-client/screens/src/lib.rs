@@ -23,4 +23,4 @@ pub mod pfm;
 pub use fault::Fault;
 pub use file::{file_name_fault, read_blend, read_surface, read_warp};
 pub use mask::Mask;
-pub use mesh::{MAX_TANGENT, OutputMesh, OutputNode, Target};
+pub use mesh::{Across, MAX_TANGENT, OutputMesh, OutputNode, Target};

@@ -1,5 +1,7 @@
 //! The mesh that a picture is drawn with: places of the output, and what each of them shows.
 
+use std::borrow::Cow;
+
 use bytemuck::{Pod, Zeroable};
 
 /// Most nodes of a grid: one for each pixel of 2560 x 1600. Smooth surfaces need a hundredth of that.
@@ -17,11 +19,20 @@ pub enum Target {
     Surface,
 }
 
+/// What the first number of the places of a mesh counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Across {
+    /// Shares of the output's width, from its left edge.
+    Width,
+    /// Halves of the output's height, from its middle to the right: such a mesh is for outputs of one shape.
+    HalfHeight,
+}
+
 /// One node. Its layout is that of a vertex.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct OutputNode {
-    /// Where in the output, shares of its width and height from the lower left; may lie beyond its edges.
+    /// Where in the output, shares of its width (else see [`Across`]) and height from the lower left; may lie beyond its edges.
     pub place: [f32; 2],
     /// What it shows there: see [`Target`].
     pub target: [f32; 3],
@@ -34,6 +45,8 @@ pub struct OutputNode {
 pub struct OutputMesh {
     /// What its nodes show.
     pub target: Target,
+    /// What their places count across the output.
+    pub across: Across,
     /// Nodes in a row, at least 2.
     pub columns: usize,
     /// Rows, at least 2.
@@ -53,6 +66,7 @@ impl OutputMesh {
         };
         Self {
             target: Target::Picture,
+            across: Across::Width,
             columns: 2,
             rows: 2,
             nodes: vec![
@@ -100,9 +114,26 @@ impl OutputMesh {
         };
         Self {
             target,
+            across: Across::Width,
             columns: columns + 2,
             rows: rows + 2,
             nodes: places.map(node).collect(),
+        }
+    }
+
+    /// The mesh with all places as shares of an output that is `aspect` times as wide as high.
+    #[must_use]
+    pub fn for_output(&self, aspect: f64) -> Cow<'_, Self> {
+        match self.across {
+            Across::Width => Cow::Borrowed(self),
+            Across::HalfHeight => {
+                let mut mesh = self.clone();
+                mesh.across = Across::Width;
+                for node in &mut mesh.nodes {
+                    node.place[0] = (0.5 + 0.5 * f64::from(node.place[0]) / aspect) as f32;
+                }
+                Cow::Owned(mesh)
+            }
         }
     }
 

@@ -213,7 +213,7 @@ fn within(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use taut_screens::{OutputNode, Target};
+    use taut_screens::{Across, OutputNode, Target};
 
     fn wall() -> Screen {
         let corners = [[-0.9, 0.0, 0.0], [0.9, 0.0, 0.0], [-0.9, 0.0, 1.2]].map(Point3::from);
@@ -240,6 +240,7 @@ mod tests {
         };
         Surface::of(&OutputMesh {
             target: Target::Surface,
+            across: Across::Width,
             columns,
             rows,
             nodes: (0..columns * rows).map(node).collect(),

@@ -2,7 +2,7 @@
 
 use super::pipeline::{FrameLayout, Layer, Output, PipelineParts};
 
-/// The pipeline of the floor; drawn as a strip of four vertices without buffers.
+/// The pipeline of the floor; drawn as a strip of four vertices without buffers, and seen from above alone.
 pub(crate) fn pipeline(
     device: &wgpu::Device,
     layout: &FrameLayout,
@@ -15,7 +15,7 @@ pub(crate) fn pipeline(
         fragment: "fragment",
         buffers: &[],
         topology: wgpu::PrimitiveTopology::TriangleStrip,
-        layer: Layer::Plane,
+        layer: Layer::Opaque,
     };
     layout.pipeline(device, output, &parts)
 }

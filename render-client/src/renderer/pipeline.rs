@@ -20,12 +20,10 @@ pub(crate) struct Output {
 /// How a pipeline of the main pass treats colour and depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layer {
-    /// Hides what is behind it.
+    /// Hides what is behind it; seen from its front.
     Opaque,
     /// Lets what is behind it shine through; seen from its front.
     Translucent,
-    /// Hides what is behind it, seen from both sides.
-    Plane,
     /// As far away as can be: where nothing is yet.
     Background,
 }
@@ -134,7 +132,6 @@ impl FrameLayout {
         );
         let module = shader(device, parts.label, source);
         let opaque = parts.layer != Layer::Translucent;
-        let one_sided = matches!(parts.layer, Layer::Opaque | Layer::Translucent);
         let background = parts.layer == Layer::Background;
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(parts.label),
@@ -147,12 +144,12 @@ impl FrameLayout {
             },
             primitive: wgpu::PrimitiveState {
                 topology: parts.topology,
-                cull_mode: one_sided.then_some(wgpu::Face::Back),
+                cull_mode: (!background).then_some(wgpu::Face::Back),
                 ..Default::default()
             },
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH,
-                depth_write_enabled: Some(matches!(parts.layer, Layer::Opaque | Layer::Plane)),
+                depth_write_enabled: Some(parts.layer == Layer::Opaque),
                 depth_compare: Some(if background {
                     wgpu::CompareFunction::LessEqual
                 } else {

@@ -105,11 +105,12 @@ impl WarpPipeline {
         }
     }
 
-    /// Brings mesh and mask of a picture to the graphics card; `scenes` are what is warped, one for each view.
+    /// Brings mesh and mask of a picture of `size` pixels to the graphics card; `scenes` are what is warped, one for each view.
     pub(crate) fn target(
         &self,
         gpu: &Gpu,
         corrected: &Corrected<'_>,
+        (width, height): (u32, u32),
         scenes: Vec<(Eye, PictureTarget, wgpu::TextureView)>,
     ) -> WarpTarget {
         let Corrected {
@@ -118,6 +119,7 @@ impl WarpPipeline {
             chart,
         } = corrected;
         let mesh = correction.mesh(*picture);
+        let mesh = mesh.for_output(f64::from(width.max(1)) / f64::from(height.max(1)));
         let mask = mask_texture(gpu, correction.mask(*picture).map(|mask| &**mask));
         let indices: Vec<[u32; 3]> = mesh.triangles().collect();
         let device = &gpu.device;

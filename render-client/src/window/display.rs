@@ -94,14 +94,8 @@ impl Display {
         let mut renderer: Option<Renderer> = None;
         let mut panes = Vec::new();
         for ((screen, place), picture, window, surface) in opened {
-            // One window waits for the monitor; the others would make it wait twice.
-            let present_mode = if panes.is_empty() {
-                wgpu::PresentMode::AutoVsync
-            } else {
-                wgpu::PresentMode::AutoNoVsync
-            };
             let size = window.inner_size();
-            let (config, format) = configuration(&gpu, &surface, size, present_mode)?;
+            let (config, format) = configuration(&gpu, &surface, size, panes.len())?;
             surface.configure(&gpu.device, &config);
             let renderer = renderer.get_or_insert_with(|| Renderer::new(&gpu, stage, format));
             let size = (config.width, config.height);
@@ -224,19 +218,33 @@ fn without_place(text: &str) -> &str {
     text[begins.unwrap_or(0)..].trim_end_matches('.')
 }
 
-/// How to show pictures on a surface, and the sRGB format to draw them in.
+/// How the window at a place among those of the node shows its pictures, of the ways that its surface offers: never torn.
+///
+/// The first window waits for its monitor. On monitors that are out of step the others would wait again: they show the newest picture at their
+/// own next refresh. Where that is not offered they wait, too: at worst the node then draws at half the refresh, the lesser evil beside
+/// a tear in every picture.
+fn present_mode(place: usize, offered: &[wgpu::PresentMode]) -> wgpu::PresentMode {
+    if place > 0 && offered.contains(&wgpu::PresentMode::Mailbox) {
+        wgpu::PresentMode::Mailbox
+    } else {
+        wgpu::PresentMode::Fifo // offered everywhere
+    }
+}
+
+/// How to show pictures on the surface of the window at a place, and the sRGB format to draw them in.
 fn configuration(
     gpu: &Gpu,
     surface: &wgpu::Surface<'_>,
     size: PhysicalSize<u32>,
-    present_mode: wgpu::PresentMode,
+    place: usize,
 ) -> Result<(wgpu::SurfaceConfiguration, wgpu::TextureFormat), RenderError> {
     let (width, height) = (size.width.max(1), size.height.max(1));
     let mut config = surface
         .get_default_config(&gpu.adapter, width, height)
         .ok_or_else(|| gpu.broken(&"it cannot show pictures in this window"))?;
-    let formats = surface.get_capabilities(&gpu.adapter).formats;
-    config.format = formats
+    let offered = surface.get_capabilities(&gpu.adapter);
+    config.format = offered
+        .formats
         .into_iter()
         .find(wgpu::TextureFormat::is_srgb)
         .unwrap_or(config.format);
@@ -244,7 +252,7 @@ fn configuration(
     if drawn != config.format {
         config.view_formats.push(drawn);
     }
-    config.present_mode = present_mode;
+    config.present_mode = present_mode(place, &offered.present_modes);
     config.desired_maximum_frame_latency = 1; // the least age that double buffering allows
     Ok((config, drawn))
 }
@@ -252,6 +260,18 @@ fn configuration(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_window_is_shown_in_a_way_that_tears() {
+        use wgpu::PresentMode::{Fifo, FifoRelaxed, Immediate, Mailbox};
+        let all = [Immediate, Mailbox, FifoRelaxed, Fifo];
+        assert_eq!(
+            [0, 1, 2].map(|place| present_mode(place, &all)),
+            [Fifo, Mailbox, Mailbox]
+        );
+        let few = [Immediate, FifoRelaxed, Fifo];
+        assert_eq!([0, 1].map(|place| present_mode(place, &few)), [Fifo, Fifo]);
+    }
 
     #[test]
     fn what_the_window_system_says_is_told_without_a_place_in_its_source() {

@@ -7,7 +7,7 @@ use rerun::{
 };
 
 use crate::error::MonitorError;
-use crate::sample::{MonitorSample, ShownContact};
+use crate::sample::MonitorSample;
 use crate::scene::{BodyRole, MonitorBody, MonitorScene, Pose};
 use crate::{colours, paths, shading};
 
@@ -31,18 +31,19 @@ pub(crate) struct Picture {
     head: Option<Head>,
     /// Path of each obstacle that moves; `None` for one at rest. In the scene's order of obstacles.
     moving: Vec<Option<EntityPath>>,
-    contacts_are_drawn: bool,
+    /// Session time at which no contacts were last sent, in nanoseconds; `None` while some may be drawn.
+    erased_ns: Option<u64>,
 }
 
 /// The head where it was last sent. It is sent again now and then although it may not move: an observer who joins
-/// late gets the newest history first, and the oldest is thrown away.
+/// late gets the newest history first, the oldest is thrown away, and one who is slow is not sent all.
 struct Head {
     pose: Pose,
     sent_ns: u64,
 }
 
-/// Time after which an unmoved head is sent again.
-const HEAD_REPEAT_NS: u64 = 1_000_000_000;
+/// Time after which what has not changed is sent again: an unmoved head, that there are no contacts.
+const REPEAT_NS: u64 = 1_000_000_000;
 
 /// Says what is wrong with a body's mesh, if anything.
 pub(crate) fn check_mesh(body: &MonitorBody) -> Result<(), MonitorError> {
@@ -106,7 +107,7 @@ impl Picture {
                 .unwrap_or(diagonal / NEWTONS_PER_DIAGONAL),
             head,
             moving: moving_paths(scene),
-            contacts_are_drawn: true,
+            erased_ns: None,
         })
     }
 
@@ -142,7 +143,7 @@ impl Picture {
             }
         }
         self.show_head(stream, sample)?;
-        self.show_contacts(stream, sample.contacts.as_slice())?;
+        self.show_contacts(stream, sample)?;
         self.show_force(stream, sample)?;
         Ok(true)
     }
@@ -162,7 +163,7 @@ impl Picture {
         match &self.head {
             None => draw_head(stream)?,
             Some(head) => {
-                let recent = now_ns.saturating_sub(head.sent_ns) < HEAD_REPEAT_NS;
+                let recent = now_ns.saturating_sub(head.sent_ns) < REPEAT_NS;
                 if recent && head.pose == pose {
                     return Ok(());
                 }
@@ -175,16 +176,19 @@ impl Picture {
         stream.log(paths::HEAD, &transform(&pose))
     }
 
-    /// Nothing is sent as long as there is nothing to draw and nothing to erase.
+    /// As long as there is nothing to draw, that is sent now and then, as the head is.
     fn show_contacts(
         &mut self,
         stream: &RecordingStream,
-        contacts: &[ShownContact],
+        sample: &MonitorSample,
     ) -> RecordingStreamResult<()> {
-        if contacts.is_empty() && !self.contacts_are_drawn {
+        let contacts = sample.contacts.as_slice();
+        let now_ns = sample.session_time_ns;
+        let recent = |erased_ns: u64| now_ns.saturating_sub(erased_ns) < REPEAT_NS;
+        if contacts.is_empty() && self.erased_ns.is_some_and(recent) {
             return Ok(());
         }
-        self.contacts_are_drawn = !contacts.is_empty();
+        self.erased_ns = contacts.is_empty().then_some(now_ns);
         let points = || contacts.iter().map(|contact| to_array(contact.point));
         let length = NORMAL_LENGTH * self.diagonal;
         let normals = contacts
@@ -370,4 +374,51 @@ fn to_array(point: Point3<f64>) -> [f32; 3] {
 
 fn to_vector(vector: Vector3<f64>) -> [f32; 3] {
     vector.map(|x| x as f32).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::ShownContact;
+    use rerun::RecordingStreamBuilder;
+    use rerun::log::{ChunkBatcherConfig, LogMsg};
+
+    /// An observer who missed the end of a contact hears of it soon.
+    #[test]
+    fn that_nothing_touches_is_sent_again_each_second() {
+        let (stream, stored) = RecordingStreamBuilder::new("test")
+            .batcher_config(ChunkBatcherConfig {
+                flush_num_rows: 1,
+                ..ChunkBatcherConfig::DEFAULT
+            })
+            .memory()
+            .unwrap();
+        let mut picture = Picture::draw_scene(&stream, &MonitorScene::new("nothing")).unwrap();
+        drop(stored.take());
+        let mut is_sent = |time_ms: u64, touches: bool| {
+            let mut sample = MonitorSample::at(time_ms * 1_000_000);
+            if touches {
+                sample.contacts.push(ShownContact {
+                    point: Point3::origin(),
+                    normal: Vector3::z(),
+                    gap: 0.0,
+                });
+            }
+            picture.show_contacts(&stream, &sample).unwrap();
+            let sent = stored.take();
+            sent.iter().any(|sent| matches!(sent, LogMsg::ArrowMsg(..)))
+        };
+        for (time_ms, touches, expected) in [
+            (0, true, true),
+            (20, true, true),
+            (40, false, true),
+            (60, false, false),
+            (1039, false, false),
+            (1040, false, true),
+            (1060, false, false),
+            (2040, false, true),
+        ] {
+            assert_eq!(is_sent(time_ms, touches), expected, "at {time_ms} ms");
+        }
+    }
 }

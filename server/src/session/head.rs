@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use god_object::nalgebra::Vector3;
 use god_object::spatial::Pose;
-use taut_bridge::{TrackerFeed, VrpnSource};
+use taut_bridge::{TrackerFeed, TrackerState, VrpnSettings, VrpnSource};
 use taut_link::HeadOutput;
 use taut_vrpn::SensorMapping;
 
@@ -89,9 +89,19 @@ enum Motion {
 #[derive(Debug)]
 struct Tracked {
     feed: TrackerFeed,
+    seen: Seen,
+}
+
+/// What a tracker has said of a head.
+#[derive(Debug)]
+struct Seen {
     mapping: SensorMapping,
-    /// Where it was seen last.
+    /// Where it was seen last; at rest before.
     last: Pose,
+    /// Reports taken in so far, by the tracker's count.
+    reports: u64,
+    /// When that of `last` was first seen, session time.
+    came: Option<Duration>,
 }
 
 impl HeadSource {
@@ -127,8 +137,7 @@ impl HeadSource {
                 TrackerFeed::start_for::<READERS>(source)?.map(|feed| {
                     head(Motion::Tracker(Box::new(Tracked {
                         feed,
-                        mapping,
-                        last: rest,
+                        seen: Seen::new(mapping, rest),
                     })))
                 })
             }
@@ -143,11 +152,8 @@ impl Head {
             Motion::Still => self.rest,
             Motion::Sway(sway) => self.rest * sway.displacement(now),
             Motion::Tracker(tracked) => {
-                let report = tracked.feed.newest().pose;
-                if let Some(pose) = report.and_then(|report| tracked.mapping.pose(&report)) {
-                    tracked.last = pose;
-                }
-                tracked.last
+                tracked.seen.take(tracked.feed.newest(), now);
+                tracked.seen.last
             }
             Motion::Remote(remote) => remote.look().pose(now),
         }
@@ -157,13 +163,43 @@ impl Head {
     pub fn read_at(&mut self, now: Duration) -> Duration {
         match &mut self.motion {
             Motion::Remote(remote) => remote.look().read_at(now),
-            Motion::Still | Motion::Sway(_) | Motion::Tracker(_) => now,
+            Motion::Tracker(tracked) => tracked.seen.read_at(now),
+            Motion::Still | Motion::Sway(_) => now,
         }
     }
 
     /// Whether its pose changes.
     pub fn moves(&self) -> bool {
         !matches!(self.motion, Motion::Still)
+    }
+}
+
+impl Seen {
+    fn new(mapping: SensorMapping, rest: Pose) -> Self {
+        Self {
+            mapping,
+            last: rest,
+            reports: 0,
+            came: None,
+        }
+    }
+
+    /// Takes in what the tracker said last, looked at at session time `now`.
+    fn take(&mut self, newest: &TrackerState, now: Duration) {
+        if newest.reports == self.reports {
+            return;
+        }
+        self.reports = newest.reports;
+        if let Some(pose) = newest.pose.and_then(|report| self.mapping.pose(&report)) {
+            (self.last, self.came) = (pose, Some(now));
+        }
+    }
+
+    /// When the head was where it was seen last, session time. After the silence by which a tracked device counts as lost it is said to be
+    /// there `now`: whoever predicts it sees that it rests.
+    fn read_at(&self, now: Duration) -> Duration {
+        let heard = |came: &Duration| now.saturating_sub(*came) <= VrpnSettings::DEFAULT_MAX_AGE;
+        self.came.filter(heard).unwrap_or(now)
     }
 }
 
@@ -219,6 +255,32 @@ mod tests {
         let mut head = head(Pose::identity(), HeadMotion::Still);
         assert_eq!(head.pose(Duration::from_secs(3)), Pose::identity());
         assert!(!head.moves());
+    }
+
+    /// 0.5 m/s, a report each 10 ms; then silence.
+    #[test]
+    fn a_tracked_head_has_the_time_of_its_report_until_silence() {
+        let ms = Duration::from_millis;
+        let mut seen = Seen::new(SensorMapping::identity(), Pose::identity());
+        let mut state = TrackerState::default();
+        seen.take(&state, ms(40));
+        assert_eq!(seen.read_at(ms(40)), ms(40), "nothing was reported");
+        for time in 50..500_u64 {
+            if time % 10 == 0 && time <= 200 {
+                state.reports += 1;
+                state.pose = Some(taut_vrpn::PoseReport {
+                    sensor: 0,
+                    position: [time as f64 * 0.5e-3, 0.0, 0.0],
+                    rotation: [0.0, 0.0, 0.0, 1.0],
+                });
+            }
+            seen.take(&state, ms(time));
+            let reported = (time / 10 * 10).min(200);
+            let place = reported as f64 * 0.5e-3;
+            assert!((seen.last.translation.x - place).abs() < 1e-12, "{time}");
+            let expected = if time <= 300 { reported } else { time };
+            assert_eq!(seen.read_at(ms(time)), ms(expected), "at {time} ms");
+        }
     }
 
     /// Nobody listens on port 1 of this machine: the head rests, for both readers, and dropping them ends the thread.

@@ -49,7 +49,7 @@ impl Renderer {
             (view.eye, picture, texture.create_view(&Default::default()))
         };
         let scenes = target.views.iter().map(scene).collect();
-        target.warp = Some(Box::new(self.warp.target(gpu, corrected, scenes)));
+        target.warp = Some(Box::new(self.warp.target(gpu, corrected, size, scenes)));
         target
     }
 
