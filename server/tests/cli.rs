@@ -164,120 +164,6 @@ fn bad_usage_is_exit_code_2() {
 }
 
 #[test]
-fn missing_files_are_named() {
-    let place = Workplace::new();
-    refused(&place.serve("absent.toml", "1", &[]), &["absent.toml"]);
-    refused(
-        &[
-            "serve",
-            "--config",
-            &place.text("workbench.toml"),
-            "--key",
-            &place.text("absent.key"),
-        ],
-        &["absent.key"],
-    );
-    refused(
-        &["serve", "--config", &place.text("workbench.toml")],
-        &["no cluster key", "taut keys"],
-    );
-    refused(
-        &place.serve("workbench.toml", "1", &["--scene", "absent.toml"]),
-        &["absent.toml"],
-    );
-    refused(
-        &place.serve("workbench.toml", "1", &["--scene", "no-such-scene"]),
-        &["no-such-scene", "peg-in-a-hole"],
-    );
-    let out = place.text("out.csv");
-    refused(
-        &[
-            "replay",
-            "--scene",
-            "sphere-on-plane",
-            "--trace",
-            "absent.csv",
-            "--out",
-            &out,
-        ],
-        &["absent.csv"],
-    );
-    assert!(!place.path("out.csv").exists());
-}
-
-#[test]
-fn broken_scenes_are_refused_with_file_and_reason() {
-    let place = Workplace::new();
-    let scene = |name: &str, god_object: &str| {
-        let text = format!(
-            "name = \"broken\"\n[god_object]\n{god_object}\n[[obstacle]]\nname = \"table\"\nshape = {{ box = {{ half_extents = [0.1, 0.1, 0.02] }} }}\n"
-        );
-        place.write(name, &text);
-        place.text(name)
-    };
-    let sphere = "shape = { sphere = { radius = 0.02 } }\n";
-    let open_mesh = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n0.1 0 0\n0 0.1 0\n3 0 1 2\n";
-    place.write("open.ply", open_mesh);
-    let cases = [
-        (
-            scene(
-                "nan.toml",
-                &format!("{sphere}mass = nan\npose = {{ position = [0, 0, 0.1] }}"),
-            ),
-            ["nan.toml", "mass"],
-        ),
-        (
-            scene(
-                "zero.toml",
-                &format!("{sphere}mass = 0.0\npose = {{ position = [0, 0, 0.1] }}"),
-            ),
-            ["zero.toml", "mass"],
-        ),
-        (
-            scene(
-                "open.toml",
-                "shape = { mesh = \"open.ply\" }\nmass = 1.0\npose = { position = [0, 0, 0.1] }",
-            ),
-            ["open.toml", "open.ply"],
-        ),
-        (
-            scene(
-                "inside.toml",
-                &format!("{sphere}mass = 1.0\npose = {{ position = [0, 0, 0.03] }}"),
-            ),
-            [
-                "inside.toml:",
-                "starts in penetration of obstacle \"table\"",
-            ],
-        ),
-        (
-            scene(
-                "typo.toml",
-                &format!("{sphere}mas = 1.0\npose = {{ position = [0, 0, 0.1] }}"),
-            ),
-            ["typo.toml", "mass"],
-        ),
-    ];
-    for (scene, parts) in cases {
-        refused(
-            &place.serve("workbench.toml", "1", &["--scene", &scene]),
-            &parts,
-        );
-    }
-}
-
-#[test]
-fn two_nodes_of_one_name_are_refused() {
-    let place = Workplace::new();
-    let twice = workbench().replace("name = \"table\"\nscreens", "name = \"front\"\nscreens");
-    place.write("twice.toml", &twice);
-    refused(
-        &place.serve("twice.toml", "1", &[]),
-        &["twice.toml", "two nodes", "front"],
-    );
-}
-
-#[test]
 fn check_names_what_serve_would_not_bear() {
     let place = Workplace::new();
     for (from, to, part) in [
@@ -306,39 +192,6 @@ fn check_names_what_serve_would_not_bear() {
             Some(2)
         );
     }
-}
-
-#[test]
-fn a_port_in_use_is_named_and_nothing_is_left_running() {
-    let place = Workplace::new();
-    let other = UdpSocket::bind(("127.0.0.1", 0)).expect("no port");
-    let address = other.local_addr().expect("no address");
-    refused(
-        &place.serve("workbench.toml", "30", &["--quic", &address.to_string()]),
-        &[&address.to_string(), "in use"],
-    );
-    refused(
-        &place.serve("workbench.toml", "30", &["--udp", &address.to_string()]),
-        &[&address.to_string(), "in use"],
-    );
-}
-
-#[test]
-fn a_server_that_nobody_runs_is_unreachable() {
-    let place = Workplace::new();
-    let silent = UdpSocket::bind(("127.0.0.1", 0))
-        .and_then(|socket| socket.local_addr())
-        .expect("no port");
-    let (server, key, out) = (
-        silent.to_string(),
-        place.text("cluster.key"),
-        place.text("trace.csv"),
-    );
-    refused(
-        &["record", "--server", &server, "--key", &key, "--out", &out],
-        &[&server],
-    );
-    assert!(!place.path("trace.csv").exists());
 }
 
 #[test]
@@ -541,17 +394,6 @@ fn check_lists_every_fault_and_tells_good_from_bad() {
             .is_some_and(|problems| problems.len() >= 2),
         "{reports}"
     );
-}
-
-#[test]
-fn a_key_is_never_overwritten() {
-    let place = Workplace::new();
-    let before = std::fs::read(place.path("cluster.key"));
-    refused(
-        &["keys", "--out", &place.text("cluster.key")],
-        &["cluster.key"],
-    );
-    assert_eq!(before.ok(), std::fs::read(place.path("cluster.key")).ok());
 }
 
 #[test]

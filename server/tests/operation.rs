@@ -3,11 +3,9 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpStream, UdpSocket};
 use std::os::unix::net::UnixDatagram;
-use std::process::{Child, Command, Stdio};
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use crate::support::{PATIENCE, Workplace, wait_until, workbench};
+use crate::support::{PATIENCE, Running, Workplace, command, signal, wait_until, workbench};
 use taut_link::proto::control::LogLevel;
 use taut_link::{
     ClientOptions, ClusterKey, JoinKey, Role, Transport, connect, create_key_file, read_key_file,
@@ -16,53 +14,9 @@ use taut_link::{
 /// Clears a screen, sets a title, turns the direction of writing, and fakes a line.
 const HOSTILE: &str = "\u{1b}[2J\u{1b}]0;owned\u{7}\u{202e}txt.exe\r\nERROR taut: all is lost";
 
-fn serve(place: &Workplace, more: &[&str], environment: &[(&str, &str)]) -> Child {
-    let child = Command::new(env!("CARGO_BIN_EXE_taut"))
-        .args(place.serve("workbench.toml", "120", more))
-        .env_remove("TAUT_KEY_FILE")
-        .env_remove("TAUT_LOG")
-        .env_remove("RUST_LOG")
-        .envs(environment.iter().copied())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn();
-    child.expect("taut starts")
-}
-
-/// What a child writes to standard error, as it comes.
-fn follow_errors(child: &mut Child) -> Arc<Mutex<String>> {
-    let text = Arc::new(Mutex::new(String::new()));
-    let (shared, mut pipe) = (text.clone(), child.stderr.take().expect("a pipe"));
-    let reader = std::thread::Builder::new().spawn(move || {
-        let mut bytes = [0; 4096];
-        while let Ok(length @ 1..) = pipe.read(&mut bytes) {
-            let more = String::from_utf8_lossy(&bytes[..length]).into_owned();
-            shared.lock().expect("no panic").push_str(&more);
-        }
-    });
-    reader.expect("a thread");
-    text
-}
-
-fn says(text: &Mutex<String>, part: &str) -> bool {
-    text.lock().expect("no panic").contains(part)
-}
-
-/// What follows `mark` to the end of the word.
-fn word_after(text: &Mutex<String>, mark: &str) -> String {
-    let text = text.lock().expect("no panic");
-    let rest = text.split_once(mark).expect("it was said").1;
-    rest.split_whitespace().next().expect("a word").to_owned()
-}
-
-fn end(mut child: Child) {
-    let asked = Command::new("kill")
-        .args(["-TERM", &child.id().to_string()])
-        .status();
-    assert!(asked.expect("kill").success());
-    wait_until("it ends", || child.try_wait().expect("a child").is_some());
-    assert!(child.wait().expect("a child").success());
+fn serve(place: &Workplace, more: &[&str], environment: &[(&str, &str)]) -> Running {
+    let arguments = place.serve("workbench.toml", "120", more);
+    Running::of(command(&arguments).envs(environment.iter().copied()))
 }
 
 fn get(address: &str, target: &str, headers: &str) -> String {
@@ -83,15 +37,13 @@ fn what_strangers_and_clients_write_is_shown_harmless_and_audited_and_metrics_ar
         .replacen("port = 4860", "port = 0", 1);
     place.write("workbench.toml", &format!("{before}[observers]{observers}"));
     let lines = place.text("metrics.jsonl");
-    let mut server = serve(
+    let server = serve(
         &place,
         &["--metrics-json", &lines, "--metrics-period", "0.2"],
         &[],
     );
-    let said = follow_errors(&mut server);
-    wait_until("observers", || says(&said, "observers: http://"));
-    let quic = word_after(&said, "serving on ");
-    let page = word_after(&said, "observers: http://");
+    let quic = server.word_after("serving on ");
+    let page = server.word_after("observers: http://");
     let page = page.trim_end_matches(['/', ',']).to_owned();
 
     let key = read_key_file(&place.path("cluster.key")).expect("the key");
@@ -112,14 +64,14 @@ fn what_strangers_and_clients_write_is_shown_harmless_and_audited_and_metrics_ar
         let operator = join(key.into(), Role::Operator, "alice").await.expect("in");
         assert!(operator.post_log(LogLevel::Error, format!("log {HOSTILE}")));
         assert!(operator.post_arm(false));
-        wait_until("the disarming is told", || says(&said, "event=\"disarm\""));
+        wait_until("the disarming is told", || server.says("event=\"disarm\""));
         operator.close().await;
     });
     wait_until("all is told", || {
-        says(&said, "alice: log") && says(&said, "event=\"left\"")
+        server.says("alice: log") && server.says("event=\"left\"")
     });
     {
-        let said = said.lock().expect("no panic");
+        let said = server.text();
         let bad = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
         assert!(!said.contains(bad), "{said:?}");
         assert!(
@@ -187,7 +139,7 @@ fn what_strangers_and_clients_write_is_shown_harmless_and_audited_and_metrics_ar
         first["haptics_hz"].is_number() && first["network"]["forged"] == 0,
         "{first}"
     );
-    end(server);
+    assert!(server.end("-TERM").status.success());
 }
 
 #[test]
@@ -201,7 +153,7 @@ fn a_service_manager_hears_ready_then_signs_of_life_then_stopping() {
         let length = manager.recv(&mut bytes).expect("a message in time");
         String::from_utf8_lossy(&bytes[..length]).into_owned()
     };
-    let mut server = serve(
+    let server = serve(
         &place,
         &[],
         &[
@@ -209,32 +161,22 @@ fn a_service_manager_hears_ready_then_signs_of_life_then_stopping() {
             ("WATCHDOG_USEC", "2000000"),
         ],
     );
-    let said = follow_errors(&mut server);
     assert!(hear().contains("READY=1"));
     assert!(hear().contains("WATCHDOG=1"));
     // A process that stands sends none: what came before is read until it is quiet.
-    let signal = |name: &str| {
-        Command::new("kill")
-            .args([name, &server.id().to_string()])
-            .status()
-    };
-    assert!(signal("-STOP").expect("kill").success());
+    server.signal("-STOP");
     manager
         .set_read_timeout(Some(Duration::from_secs(1)))
         .expect("a socket");
     let mut bytes = [0; 1024];
     while manager.recv(&mut bytes).is_ok() {}
-    assert!(signal("-CONT").expect("kill").success());
+    server.signal("-CONT");
     manager.set_read_timeout(Some(PATIENCE)).expect("a socket");
     assert!(hear().contains("WATCHDOG=1"), "it goes on");
-    let asked = signal("-TERM").expect("kill");
-    assert!(asked.success());
+    server.signal("-TERM");
     wait_until("it says that it stops", || hear().contains("STOPPING=1"));
-    assert!(
-        server.wait().expect("a child").success(),
-        "{:?}",
-        said.lock()
-    );
+    let ended = server.ended();
+    assert!(ended.status.success(), "{ended:?}");
 }
 
 /// A client's part of the same: it is ready while it waits for a server that is not there, alive, and stops when it is told to.
@@ -262,26 +204,19 @@ fn bridge_tracker_and_recorder_tell_the_service_manager_that_they_live() {
             let length = manager.recv(&mut bytes).expect("a message in time");
             String::from_utf8_lossy(&bytes[..length]).into_owned()
         };
-        let child = Command::new(env!("CARGO_BIN_EXE_taut"))
-            .args([role, "--server", &server, "--key", &key, "--stay"])
-            .args(more)
-            .env("NOTIFY_SOCKET", &path)
-            .env("WATCHDOG_USEC", "2000000")
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn();
-        let mut child = child.expect("taut starts");
+        let always = [role, "--server", &server, "--key", &key, "--stay"];
+        let child = Running::of(
+            command(&[&always, more].concat())
+                .env("NOTIFY_SOCKET", &path)
+                .env("WATCHDOG_USEC", "2000000"),
+        );
         let first = hear();
         assert!(first.contains("READY=1"), "{role}: {first}");
         assert!(first.contains(status), "{role}: {first}");
         assert!(hear().contains("WATCHDOG=1"), "{role}");
-        let asked = Command::new("kill")
-            .args(["-TERM", &child.id().to_string()])
-            .status();
-        assert!(asked.expect("kill").success());
+        child.signal("-TERM");
         wait_until(role, || hear().contains("STOPPING=1"));
-        let _ = child.wait().expect("a child"); // it says that it never joined
+        let _ = child.ended(); // it says that it never joined
     }
 }
 
@@ -290,13 +225,13 @@ fn bridge_tracker_and_recorder_tell_the_service_manager_that_they_live() {
 fn metrics_that_find_no_room_are_told_of_once_and_end_nothing() {
     let place = Workplace::new();
     let options = ["--metrics-json", "/dev/full", "--metrics-period", "0.05"];
-    let mut server = serve(&place, &options, &[]);
-    let said = follow_errors(&mut server);
-    wait_until("the loss is told", || says(&said, "lines are lost"));
+    let server = serve(&place, &options, &[]);
+    wait_until("the loss is told", || server.says("lines are lost"));
     // Some periods later it is there and has said no more of it.
     std::thread::sleep(Duration::from_millis(500));
-    end(server);
-    let said = said.lock().expect("no panic");
+    let ended = server.end("-TERM");
+    assert!(ended.status.success());
+    let said = String::from_utf8_lossy(&ended.stderr);
     assert_eq!(said.matches("/dev/full").count(), 1, "{said}");
 }
 
@@ -314,7 +249,10 @@ fn a_terminal_that_stands_costs_lines_and_no_time() {
         "--metrics-period",
         "0.2",
     ];
-    let mut server = serve(&place, &options, &[("TAUT_LOG", "trace")]);
+    let mut server = command(&place.serve("workbench.toml", "120", &options))
+        .env("TAUT_LOG", "trace")
+        .spawn()
+        .expect("taut starts");
     let stderr = server.stderr.take();
     let mut lines = BufReader::new(server.stdout.take().expect("a pipe")).lines();
     let mut next = || -> serde_json::Value {
@@ -347,10 +285,7 @@ fn a_terminal_that_stands_costs_lines_and_no_time() {
             .as_f64()
             .is_some_and(|rate| rate > 100.0)
     );
-    let asked = Command::new("kill")
-        .args(["-TERM", &server.id().to_string()])
-        .status();
-    assert!(asked.expect("kill").success());
+    signal(&server, "-TERM");
     let reader = std::thread::Builder::new().spawn(move || while lines.next().is_some() {});
     wait_until("it ends although nobody reads", || {
         server.try_wait().expect("a child").is_some()

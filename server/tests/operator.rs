@@ -4,13 +4,11 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::os::unix::fs::PermissionsExt;
-use std::process::{Child, Command, Stdio};
-use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{PATIENCE, Workplace, start, taut, wait_until, workbench};
+use crate::support::{PATIENCE, Running, Workplace, taut, wait_until, workbench};
 
 pub(crate) const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 /// A force that is one, N.
@@ -46,8 +44,7 @@ fn write_token(place: &Workplace, token: &str, mode: u32) {
 
 /// A running server with a page.
 pub(crate) struct Served {
-    process: Child,
-    said: Arc<Mutex<String>>,
+    process: Running,
     pub(crate) address: String,
     pub(crate) place: Workplace,
 }
@@ -61,30 +58,9 @@ impl Served {
     pub(crate) fn start_in(place: Workplace, text: &str, more: &[&str]) -> Self {
         place.write("workbench.toml", text);
         write_token(&place, TOKEN, 0o600);
-        let mut process = Command::new(env!("CARGO_BIN_EXE_taut"))
-            .args(place.serve("workbench.toml", "300", more))
-            .env_remove("TAUT_KEY_FILE")
-            .env_remove("TAUT_LOG")
-            .env_remove("RUST_LOG")
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("taut starts");
-        let said = Arc::new(Mutex::new(String::new()));
-        let (shared, mut pipe) = (said.clone(), process.stderr.take().expect("a pipe"));
-        let reader = std::thread::Builder::new().spawn(move || {
-            let mut bytes = [0; 4096];
-            while let Ok(length @ 1..) = pipe.read(&mut bytes) {
-                let more = String::from_utf8_lossy(&bytes[..length]).into_owned();
-                shared.lock().expect("no panic").push_str(&more);
-            }
-        });
-        reader.expect("a thread");
         const MARK: &str = "operator's page: http://";
         let mut served = Self {
-            process,
-            said,
+            process: Running::start(&place.serve("workbench.toml", "300", more)),
             address: String::new(),
             place,
         };
@@ -97,7 +73,7 @@ impl Served {
     }
 
     pub(crate) fn text(&self) -> String {
-        self.said.lock().expect("no panic").clone()
+        self.process.text()
     }
 
     /// Whether there is a line with all of these.
@@ -152,19 +128,6 @@ impl Served {
 
     pub(crate) fn wait_for_run(&self, run: &str) {
         wait_until(run, || self.now("run") == run);
-    }
-
-    fn signal(&self, name: &str) {
-        let id = self.process.id().to_string();
-        let sent = Command::new("kill").args([name, &id]).status();
-        assert!(sent.expect("kill").success());
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }
 
@@ -266,12 +229,8 @@ fn the_token_arms_and_disarms_and_whoever_has_none_is_refused_and_audited() {
 #[test]
 fn a_status_line_says_who_is_there_and_how_the_loops_do_and_ends_with_the_server() {
     let served = Served::start(&with_token_file());
-    let quic = {
-        let text = served.text();
-        let rest = text.split_once("serving on ").expect("was said").1;
-        rest.split(' ').next().expect("an address").to_owned()
-    };
-    let mut recorder = start(&[
+    let quic = served.process.word_after("serving on ");
+    let _recorder = Running::start(&[
         "record",
         "--server",
         &quic,
@@ -324,13 +283,11 @@ fn a_status_line_says_who_is_there_and_how_the_loops_do_and_ends_with_the_server
         assert!(metrics[key]["p99"].as_f64() > Some(0.0), "{key}");
     }
     // One that stands says nothing more; one that ends, ends the stream.
-    served.signal("-STOP");
+    served.process.signal("-STOP");
     std::thread::sleep(Duration::from_millis(300));
-    served.signal("-CONT");
-    served.signal("-TERM");
+    served.process.signal("-CONT");
+    served.process.signal("-TERM");
     while next().is_some() {}
-    let _ = recorder.kill();
-    let _ = recorder.wait();
 }
 
 #[test]
@@ -417,11 +374,11 @@ fn on_a_terminal_the_address_with_a_fresh_token_is_printed_once_and_opens() {
         .chain(place.serve("workbench.toml", "300", &[]))
         .map(|word| format!("'{word}'"))
         .collect();
-    let mut terminal = Command::new("script")
+    let mut terminal = std::process::Command::new("script")
         .args(["-qfec", &command.join(" "), "/dev/null"])
         .env_remove("TAUT_KEY_FILE")
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
         .spawn()
         .expect("script, of util-linux");
     let lines = BufReader::new(terminal.stdout.take().expect("a pipe")).lines();

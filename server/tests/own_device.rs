@@ -1,18 +1,13 @@
 //! A force device in `[device]` of the workbench file: opened, armed and felt by `taut serve` itself.
 #![cfg(unix)]
 
-use std::io::{BufRead, BufReader};
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use taut_bridge::Hand;
 use taut_bridge::haply::{HaplyService, SimulatedInverse, SimulatedSettings};
 use taut_link::{ClientOptions, Role, connect, read_key_file};
 
-use crate::support::{Workplace, start, taut, workbench};
-
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
+use crate::support::{PATIENCE, Running, Workplace, taut, workbench};
 
 /// The shipped workbench with this device, which nobody needs to arm.
 fn with_device(keys: &str) -> String {
@@ -28,22 +23,8 @@ fn served_until(keys: &str, enough: impl Fn(f32) -> bool) -> serde_json::Value {
     let place = Workplace::new();
     place.write("workbench.toml", &with_device(keys));
     // Ended by a signal: how long a busy machine takes to bring a force about is nobody's promise.
-    let mut server = start(&place.serve("workbench.toml", "300", &["--allow-unstable"]));
-    let mut lines = BufReader::new(server.stderr.take().expect("piped")).lines();
-    let mut said = String::new();
-    let address = loop {
-        let Some(Ok(line)) = lines.next() else {
-            panic!("it does not serve: {said}");
-        };
-        said.extend([line.as_str(), "\n"]);
-        if let Some(rest) = line.strip_prefix("serving on ") {
-            break rest.split(' ').next().unwrap_or(rest).to_owned();
-        }
-    };
-    let rest = std::thread::Builder::new()
-        .name("errors".to_owned())
-        .spawn(move || lines.map_while(Result::ok).collect::<Vec<_>>())
-        .expect("a thread");
+    let server = Running::start(&place.serve("workbench.toml", "300", &["--allow-unstable"]));
+    let address = server.word_after("serving on ");
     let key = read_key_file(&place.path("cluster.key")).expect("a key");
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     let options = ClientOptions::new(address, key, Role::Operator, "witness");
@@ -59,11 +40,8 @@ fn served_until(keys: &str, enough: impl Fn(f32) -> bool) -> serde_json::Value {
             enough(force.iter().map(|part| part * part).sum::<f32>().sqrt())
         });
     }
-    let id = server.id().to_string();
-    let sent = Command::new("kill").args(["-INT", &id]).status();
-    assert!(sent.is_ok_and(|status| status.success()));
-    let output = server.wait_with_output().expect("it ends");
-    said += &rest.join().expect("read").join("\n");
+    let output = server.end("-INT");
+    let said = String::from_utf8_lossy(&output.stderr);
     assert!(is_enough, "no force that is enough within a minute: {said}");
     assert!(output.status.success(), "{said}");
     assert!(said.contains("type arm and Enter"), "{said}");

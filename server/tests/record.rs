@@ -1,47 +1,9 @@
 //! `taut record` beside servers that stop, are killed and come back.
 
-use std::io::Read;
 use std::net::UdpSocket;
 use std::path::Path;
-use std::process::{Child, Command};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
 
-use crate::support::{Workplace, start};
-
-/// Longer than processes take that start one after the other on a busy machine.
-const LONG_PATIENCE: Duration = Duration::from_secs(60);
-
-/// What a child writes to standard error, as it comes.
-fn follow_errors(child: &mut Child) -> Arc<Mutex<String>> {
-    let text = Arc::new(Mutex::new(String::new()));
-    let mut pipe = child.stderr.take().expect("no pipe");
-    let shared = text.clone();
-    let reader = std::thread::Builder::new()
-        .name("errors".into())
-        .spawn(move || {
-            let mut bytes = [0; 4096];
-            while let Ok(length @ 1..) = pipe.read(&mut bytes) {
-                if let Ok(mut text) = shared.lock() {
-                    text.push_str(&String::from_utf8_lossy(&bytes[..length]));
-                }
-            }
-        });
-    assert!(reader.is_ok());
-    text
-}
-
-fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
-    let begun = Instant::now();
-    while !holds() {
-        assert!(begun.elapsed() < LONG_PATIENCE, "{what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
-fn says(text: &Mutex<String>, part: &str) -> bool {
-    text.lock().is_ok_and(|text| text.contains(part))
-}
+use crate::support::{PATIENCE, Running, Workplace, wait_until};
 
 /// Times of the rows of a trace, s.
 fn times(trace: &Path) -> Vec<f64> {
@@ -60,46 +22,37 @@ fn a_recording_goes_on_when_its_server_was_killed_and_comes_back() {
     };
     let (address, out) = (free(), place.text("trace.csv"));
     let serve = place.serve("workbench.toml", "120", &["--quic", &address]);
-    let mut first = start(&serve);
-    let first_says = follow_errors(&mut first);
-    wait_until("no server", || says(&first_says, "serving on"));
+    let first = Running::start(&serve);
+    wait_until("no server", || first.says("serving on"));
     let key = place.text("cluster.key");
-    let mut recorder = start(&["record", "--server", &address, "--key", &key, "--out", &out]);
-    let recorder_says = follow_errors(&mut recorder);
+    let recorder = Running::start(&["record", "--server", &address, "--key", &key, "--out", &out]);
     // Rows go through a buffer, so that there are some hundreds when it was written the first time.
     let partial = place.path(&format!(".trace.csv.{}.partial", recorder.id()));
     wait_until("no rows", || {
         std::fs::metadata(&partial).is_ok_and(|file| file.len() > 0)
     });
 
-    assert!(first.kill().is_ok() && first.wait().is_ok());
-    let mut second = start(&serve);
-    let second_says = follow_errors(&mut second);
-    wait_until("no server again", || says(&second_says, "serving on"));
+    drop(first); // killed
+    let second = Running::start(&serve);
+    wait_until("no server again", || second.says("serving on"));
     wait_until("not joined again", || {
-        says(&recorder_says, "joined again; the trace has a gap")
+        recorder.says("joined again; the trace has a gap")
     });
     let before = std::fs::metadata(&partial).map_or(0, |file| file.len());
     wait_until("no more rows", || {
         std::fs::metadata(&partial).is_ok_and(|file| file.len() > before)
     });
 
-    let asked = Command::new("kill")
-        .args(["-INT", &recorder.id().to_string()])
-        .status();
-    assert!(asked.is_ok_and(|status| status.success()));
-    let ended = recorder.wait();
-    assert!(ended.is_ok_and(|status| status.success()));
+    assert!(recorder.end("-INT").status.success());
     let times = times(&place.path("trace.csv"));
     assert_eq!(times.first(), Some(&0.0));
     let gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     assert!(gaps.iter().all(|gap| *gap > 0.0), "time goes back");
     let longest = gaps.iter().copied().fold(0.0, f64::max);
     assert!(
-        (0.02..LONG_PATIENCE.as_secs_f64()).contains(&longest),
+        (0.02..PATIENCE.as_secs_f64()).contains(&longest),
         "the server was away for {longest} s"
     );
-    assert!(second.kill().is_ok() && second.wait().is_ok());
 }
 
 #[test]
@@ -113,37 +66,26 @@ fn a_recording_ends_with_the_server_that_stops_unless_told_to_stay() {
     let record = |out: &str, more: &[&str]| {
         let out = place.text(out);
         let always = ["record", "--server", &address, "--key", &key, "--out", &out];
-        start(&[&always[..], more].concat())
+        Running::start(&[&always[..], more].concat())
     };
     let mut staying = record("staying.csv", &["--stay"]);
     let serve = place.serve("workbench.toml", "120", &["--quic", &address]);
-    let mut server = start(&serve);
-    let server_says = follow_errors(&mut server);
-    wait_until("no server", || says(&server_says, "serving on"));
-    let mut leaving = record("leaving.csv", &[]);
+    let server = Running::start(&serve);
+    wait_until("no server", || server.says("serving on"));
+    let leaving = record("leaving.csv", &[]);
     let partial =
-        |name: &str, child: &Child| place.path(&format!(".{name}.{}.partial", child.id()));
+        |name: &str, child: &Running| place.path(&format!(".{name}.{}.partial", child.id()));
     for (name, child) in [("staying.csv", &staying), ("leaving.csv", &leaving)] {
         let partial = partial(name, child);
         wait_until(name, || {
             std::fs::metadata(&partial).is_ok_and(|file| file.len() > 0)
         });
     }
-    let terminate = |child: &Child| {
-        let asked = Command::new("kill")
-            .args(["-TERM", &child.id().to_string()])
-            .status();
-        assert!(asked.is_ok_and(|status| status.success()));
-    };
-    terminate(&server);
-    assert!(leaving.wait().is_ok_and(|status| status.success()));
+    server.signal("-TERM");
+    assert!(leaving.ended().status.success());
     assert!(times(&place.path("leaving.csv")).len() > 100);
-    assert!(server.wait().is_ok());
-    assert!(
-        matches!(staying.try_wait(), Ok(None)),
-        "it was told to stay"
-    );
-    terminate(&staying);
-    assert!(staying.wait().is_ok_and(|status| status.success()));
+    let _ = server.ended();
+    assert!(staying.runs(), "it was told to stay");
+    assert!(staying.end("-TERM").status.success());
     assert!(times(&place.path("staying.csv")).len() > 100);
 }

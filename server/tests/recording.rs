@@ -13,12 +13,10 @@ use taut::shared::failure::Failure;
 use taut::shared::shutdown::Shutdown;
 use taut_link::ClusterKey;
 
-use crate::support::{Workplace, shipped_workbench, taut};
+use crate::support::{PATIENCE, Workplace, shipped_workbench, taut};
 
 /// How long a session runs at least: the simulated hand touches before.
 const RUN: Duration = Duration::from_millis(2500);
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
 /// Recordings of a scene until one is whole: what a starved recorder could not write in time is missing, and said to be.
 const ATTEMPTS: u32 = 5;
 /// Updates that a recording must hold to be worth something.

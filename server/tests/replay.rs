@@ -1,27 +1,27 @@
 //! Replay through the program: deterministic, complete, and gone without a trace when it fails.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
-fn taut(arguments: &[&str]) -> Output {
-    match Command::new(env!("CARGO_BIN_EXE_taut"))
-        .args(arguments)
-        .output()
-    {
-        Ok(output) => output,
-        Err(error) => panic!("taut does not start: {error}"),
-    }
-}
+use taut_scene::REPLAY_COLUMNS;
+
+use crate::support::taut;
 
 fn temporary() -> tempfile::TempDir {
-    match tempfile::tempdir() {
-        Ok(directory) => directory,
-        Err(error) => panic!("no temporary directory: {error}"),
-    }
+    tempfile::tempdir().expect("no temporary directory")
 }
 
-/// A sphere is pressed 5 mm into the plane, slid, and lifted, at 500 Hz.
-fn write_trace(path: &Path) {
+/// `taut replay` of the hand in `hand.csv`, with its answer in `out.csv`.
+fn replay(directory: &Path, scene: &str, more: &[&str]) -> Output {
+    let text = |name: &str| directory.join(name).display().to_string();
+    let (hand, out) = (text("hand.csv"), text("out.csv"));
+    let always = ["replay", "--scene", scene, "--trace", &hand, "--out", &out];
+    taut(&[&always, more].concat())
+}
+
+/// The same of a hand that presses a sphere 5 mm into the plane, slides it, and lifts it, at 500 Hz: the report and the answer.
+fn pressed(more: &[&str]) -> (serde_json::Value, String) {
+    let directory = temporary();
     let mut text = String::from("t,x,y,z,qw,qx,qy,qz\n");
     for row in 0..1000_u32 {
         let time = f64::from(row) * 0.002;
@@ -31,40 +31,26 @@ fn write_trace(path: &Path) {
             0.05 - 0.05 * time
         ));
     }
-    assert!(std::fs::write(path, text).is_ok());
-}
-
-fn path_text(path: &Path) -> &str {
-    path.to_str().unwrap_or_default()
+    assert!(std::fs::write(directory.path().join("hand.csv"), text).is_ok());
+    let more = [&["--json"], more].concat();
+    let output = replay(directory.path(), "sphere-on-plane", &more);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let report = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    let answer = std::fs::read_to_string(directory.path().join("out.csv"));
+    (report, answer.unwrap_or_default())
 }
 
 #[test]
 fn the_same_trace_gives_the_same_bytes_and_a_complete_report() {
-    let directory = temporary();
-    let trace = directory.path().join("trace.csv");
-    write_trace(&trace);
     let mut answers = Vec::new();
-    for (name, rate) in [("a.csv", "250"), ("b.csv", "250"), ("c.csv", "70")] {
-        let out = directory.path().join(name);
-        let output = taut(&[
-            "replay",
-            "--scene",
-            "sphere-on-plane",
-            "--trace",
-            path_text(&trace),
-            "--out",
-            path_text(&out),
-            "--god-object-rate",
-            rate,
-            "--json",
-        ]);
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    for rate in ["250", "250", "70"] {
+        let (report, answer) = pressed(&["--god-object-rate", rate]);
         assert_eq!(report["steps"], 1000);
+        assert_eq!(report["solver_fallbacks"], 0);
         assert!(
             report["max_force_n"]
                 .as_f64()
@@ -85,39 +71,20 @@ fn the_same_trace_gives_the_same_bytes_and_a_complete_report() {
                 .is_some_and(|count| count > 0),
             "{report}"
         );
-        answers.push(std::fs::read(&out).unwrap_or_default());
+        answers.push(answer);
     }
     assert!(!answers[0].is_empty());
     assert!(answers[0] == answers[1], "the same input gave other bytes");
     assert!(answers[0] != answers[2], "the rate makes no difference");
-    let text = String::from_utf8_lossy(&answers[0]);
-    assert_eq!(text.lines().count(), 1001);
-    assert!(text.starts_with("t,hx,hy,hz,hqw,hqx,hqy,hqz,sx,sy,sz,"));
+    assert_eq!(answers[0].lines().count(), 1001);
+    assert_eq!(answers[0].lines().next(), Some(REPLAY_COLUMNS));
+    assert!(REPLAY_COLUMNS.starts_with("t,hx,hy,hz,hqw,hqx,hqy,hqz,sx,sy,sz,"));
 }
 
 #[test]
 fn timings_add_two_columns_and_change_no_other() {
-    let directory = temporary();
-    let trace = directory.path().join("trace.csv");
-    write_trace(&trace);
-    let run = |name: &str, more: &[&str]| {
-        let out = directory.path().join(name);
-        let mut arguments = vec![
-            "replay",
-            "--scene",
-            "sphere-on-plane",
-            "--trace",
-            path_text(&trace),
-            "--out",
-        ];
-        let out_text = path_text(&out).to_owned();
-        arguments.push(&out_text);
-        arguments.extend(more);
-        assert!(taut(&arguments).status.success());
-        std::fs::read_to_string(&out).unwrap_or_default()
-    };
-    let plain = run("plain.csv", &[]);
-    let timed = run("timed.csv", &["--timings"]);
+    let (_, plain) = pressed(&[]);
+    let (_, timed) = pressed(&["--timings"]);
     assert!(
         timed
             .lines()
@@ -125,38 +92,13 @@ fn timings_add_two_columns_and_change_no_other() {
             .is_some_and(|header| header.ends_with(",stale,update_us,force_us"))
     );
     for (plain, timed) in plain.lines().zip(timed.lines()) {
-        assert!(timed.starts_with(plain), "{plain}\n{timed}");
+        assert_eq!(timed.rsplitn(3, ',').last(), Some(plain));
     }
 }
 
 #[test]
 fn overrides_and_solvers_reach_the_method() {
-    let directory = temporary();
-    let trace = directory.path().join("trace.csv");
-    write_trace(&trace);
-    let force = |more: &[&str]| {
-        let out = directory.path().join("out.csv");
-        let mut arguments = vec![
-            "replay",
-            "--scene",
-            "sphere-on-plane",
-            "--trace",
-            path_text(&trace),
-            "--json",
-            "--out",
-        ];
-        let out_text = path_text(&out).to_owned();
-        arguments.push(&out_text);
-        arguments.extend(more);
-        let output = taut(&arguments);
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
-        report["max_force_n"].as_f64().unwrap_or(f64::NAN)
-    };
+    let force = |more: &[&str]| pressed(more).0["max_force_n"].as_f64().unwrap_or(f64::NAN);
     let plain = force(&[]);
     let soft = force(&["--set", "coupling.k_h=1000.0"]);
     assert!((soft / plain - 0.5).abs() < 1e-3, "{soft} N of {plain} N");
@@ -170,24 +112,14 @@ fn overrides_and_solvers_reach_the_method() {
 #[test]
 fn a_failing_replay_leaves_no_file_and_says_one_sentence() {
     let directory = temporary();
-    let trace = directory.path().join("trace.csv");
     let broken = "t,x,y,z,qw,qx,qy,qz\n0.0,0.05,0,0.04,1,0,0,0\n0.001,nan,0,0.04,1,0,0,0\n";
-    assert!(std::fs::write(&trace, broken).is_ok());
-    let out = directory.path().join("out.csv");
-    let output = taut(&[
-        "replay",
-        "--scene",
-        "sphere-on-plane",
-        "--trace",
-        path_text(&trace),
-        "--out",
-        path_text(&out),
-    ]);
+    assert!(std::fs::write(directory.path().join("hand.csv"), broken).is_ok());
+    let output = replay(directory.path(), "sphere-on-plane", &[]);
     assert_eq!(output.status.code(), Some(2));
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(
         error.starts_with("taut: ")
-            && error.contains("trace.csv:3")
+            && error.contains("hand.csv:3")
             && error.trim().lines().count() == 1,
         "{error}"
     );
@@ -205,7 +137,6 @@ fn an_obstacle_with_a_motion_pushes_the_body_and_the_hand() {
     let scene = directory.path().join("rising.toml");
     let plate = directory.path().join("plate.csv");
     let hand = directory.path().join("hand.csv");
-    let out = directory.path().join("out.csv");
     std::fs::write(
         &scene,
         r#"
@@ -234,17 +165,10 @@ motion = { trace = "plate.csv" }
         still.push_str(&format!("{},0,0,0.03,1,0,0,0\n", f64::from(row) * 1e-3));
     }
     std::fs::write(&hand, still).expect("a file");
-    let run = taut(&[
-        "replay",
-        "--scene",
-        path_text(&scene),
-        "--trace",
-        path_text(&hand),
-        "--out",
-        path_text(&out),
-    ]);
+    let scene = scene.display().to_string();
+    let run = replay(directory.path(), &scene, &[]);
     assert!(run.status.success(), "{run:?}");
-    let rows = std::fs::read_to_string(&out).expect("an answer");
+    let rows = std::fs::read_to_string(directory.path().join("out.csv")).expect("an answer");
     let header: Vec<&str> = rows.lines().next().expect("a header").split(',').collect();
     let column = |row: &str, name: &str| -> f64 {
         let index = header.iter().position(|h| *h == name).expect("a column");

@@ -2,33 +2,15 @@
 #![cfg(target_os = "linux")]
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader};
-use std::path::Path;
-use std::process::{Child, ChildStderr, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use taut_link::create_key_file;
-
-const PATIENCE: Duration = Duration::from_secs(60);
+use crate::support::{PATIENCE, Running, Workplace, wait_until, workbench};
 
 /// How the system schedules a thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Class {
     Fifo(u32),
     Normal { nice: i32 },
-}
-
-/// Killed when the test ends, however it ends. What it writes must find a reader as long as it runs.
-struct Server {
-    child: Child,
-    stderr: BufReader<ChildStderr>,
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 /// Classes by thread name; of several threads of one name, all.
@@ -53,49 +35,22 @@ fn classes(process: u32) -> BTreeMap<String, Vec<Class>> {
     found
 }
 
-fn serve(directory: &Path) -> Server {
-    create_key_file(&directory.join("cluster.key")).expect("a key");
-    let mut file: toml::Table = taut_scene::SHIPPED_WORKBENCH.parse().expect("TOML");
-    let mut set = |table: &str, key: &str, value: toml::Value| {
-        let table = file.get_mut(table).and_then(toml::Value::as_table_mut);
-        table.expect("a table").insert(key.to_owned(), value);
-    };
-    set("network", "quic_port", 0.into());
-    set("network", "udp_port", 0.into());
-    set("monitoring", "enabled", false.into());
+/// A server of a bridge, without one.
+fn serve() -> (Workplace, Running) {
+    let place = Workplace::new();
+    let mut file: toml::Table = workbench().parse().expect("TOML");
     let remote = [("kind".to_owned(), toml::Value::from("remote"))];
     file.insert("device".to_owned(), toml::Table::from_iter(remote).into());
-    let config = directory.join("workbench.toml");
-    std::fs::write(&config, file.to_string()).expect("written");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_taut"))
-        .args(["serve", "--duration", "60", "--config"])
-        .arg(&config)
-        .arg("--key")
-        .arg(directory.join("cluster.key"))
-        .stderr(Stdio::piped())
-        .stdout(Stdio::null())
-        .spawn()
-        .expect("the program");
-    let stderr = BufReader::new(child.stderr.take().expect("piped"));
-    let mut server = Server { child, stderr };
-    let mut said = String::new();
-    while server
-        .stderr
-        .read_line(&mut said)
-        .is_ok_and(|read| read > 0)
-    {
-        if said.contains("serving on") {
-            return server;
-        }
-    }
-    panic!("it does not serve: {said}");
+    place.write("workbench.toml", &file.to_string());
+    let server = Running::start(&place.serve("workbench.toml", "60", &[]));
+    wait_until("it serves", || server.says("serving on"));
+    (place, server)
 }
 
 #[test]
 fn the_device_comes_first_then_the_loops_and_strangers_are_of_the_normal_class() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let server = serve(directory.path());
-    let process = server.child.id();
+    let (_place, server) = serve();
+    let process = server.id();
     let wanted = ["device-input", "haptics", "coupling", "broadcast", "frames"];
     let end = Instant::now() + PATIENCE;
     loop {
@@ -147,9 +102,8 @@ fn the_device_comes_first_then_the_loops_and_strangers_are_of_the_normal_class()
 
 #[test]
 fn a_server_leaves_no_core_dump() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let server = serve(directory.path());
-    let limits = std::fs::read_to_string(format!("/proc/{}/limits", server.child.id()));
+    let (_place, server) = serve();
+    let limits = std::fs::read_to_string(format!("/proc/{}/limits", server.id()));
     let limits = limits.expect("it runs");
     let core = limits
         .lines()

@@ -19,10 +19,7 @@ use taut_link::{
     ClientOptions, ClusterKey, ReceivedState, Role, connect, create_key_file, read_key_file,
 };
 
-use crate::support::shipped_workbench;
-
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
+use crate::support::{PATIENCE, shipped_workbench};
 
 fn setup() -> SessionSetup {
     let key = ClusterKey::generate().expect("no random numbers");

@@ -3,19 +3,16 @@
 use std::fs;
 use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Output, Stdio};
 
 use taut_scene::{Device, Workbench};
 
-use crate::support::{Workplace, taut};
+use crate::support::{Workplace, command, taut};
 
 /// Runs it with these answers, one a line.
 fn answered(place: &Workplace, answers: &str) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_taut"))
-        .args(["setup", "--out", &place.text("mine.toml")])
+    let mut child = command(&["setup", "--out", &place.text("mine.toml")])
         .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
         .spawn()
         .expect("taut starts");
     let mut input = child.stdin.take().expect("piped");

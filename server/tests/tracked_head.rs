@@ -15,8 +15,7 @@ use taut_link::{
 use taut_proto::state::HEAD_TRACKED;
 use taut_scene::{HeadTracking, SHIPPED_WORKBENCH, Workbench};
 
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
+use crate::support::PATIENCE;
 
 /// A head that stands half a metre beside its rest, for as long as the test wants.
 const TRACE: &str = "t,x,y,z,qw,qx,qy,qz\n0,0.5,-1.3,0.9,1,0,0,0\n1,0.5,-1.3,0.9,1,0,0,0\n";

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use taut::session::Session;
@@ -14,10 +14,7 @@ use taut_proto::ForceSample;
 use taut_proto::control::RefusalCode;
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
-use crate::support::Workplace;
-
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
+use crate::support::{PATIENCE, Workplace, command};
 
 fn overrides() -> Vec<String> {
     [
@@ -202,16 +199,13 @@ fn a_sender_gives_one_newton_the_hand_feels_it_and_when_the_sender_dies_it_fades
 
 /// `taut push-wrench`.
 pub(crate) fn sender(server: &str, key: &Path, more: &[&str]) -> Child {
-    let child = Command::new(env!("CARGO_BIN_EXE_taut"))
-        .args(["push-wrench", "--server", server, "--key"])
-        .arg(key)
-        .args(more)
-        .env_remove("TAUT_KEY_FILE")
+    let key = key.display().to_string();
+    let always = ["push-wrench", "--server", server, "--key", &key];
+    command(&[&always, more].concat())
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn();
-    child.unwrap_or_else(|error| panic!("{error}"))
+        .spawn()
+        .expect("taut starts")
 }
 
 #[test]

@@ -11,11 +11,8 @@ use taut_bridge::{BridgeArgs, BridgeReport};
 use taut_link::create_key_file;
 
 use crate::relay::{Impairment, Waiting};
-use crate::support::shipped_workbench;
+use crate::support::{PATIENCE, shipped_workbench};
 use crate::wrench_in::{felt, sender};
-
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 #[derive(Parser)]
 struct Cli {

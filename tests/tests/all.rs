@@ -17,6 +17,5 @@ mod method_scenes;
 mod monitor;
 mod pictures;
 mod promises;
-mod replay;
 mod revocation;
 mod soak;

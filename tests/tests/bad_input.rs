@@ -38,6 +38,7 @@ fn refused(workbench: &TestWorkbench, case: &str, arguments: &[&str], parts: &[&
     assert_eq!(ended.stdout, "", "{case}");
     let sentence = ended.one_sentence();
     println!("{case}: {sentence}");
+    assert!(sentence.starts_with("taut: "), "{case}: {sentence}");
     for part in parts {
         assert!(
             sentence.contains(part),
@@ -217,6 +218,7 @@ fn a_broken_trace_is_refused_by_its_line() {
         &gone,
         &["gone.csv", "check the path"],
     );
+    assert!(!workbench.directory().join("answer.csv").exists());
 }
 
 #[test]
@@ -255,7 +257,7 @@ fn a_broken_workbench_is_refused_and_nothing_of_it_starts() {
         &workbench,
         "two nodes of one name",
         &[],
-        &["workbench.toml:", "front", "node"],
+        &["workbench.toml:", "front", "two nodes"],
     );
 
     workbench.file = good.clone();
@@ -281,7 +283,22 @@ fn a_broken_workbench_is_refused_and_nothing_of_it_starts() {
         &workbench,
         "start in penetration",
         &["--scene", &scene],
-        &["inside.toml:", "penetration", "\"plane\""],
+        &[
+            "inside.toml:",
+            "starts in penetration of obstacle \"plane\"",
+        ],
+    );
+    serve(
+        &workbench,
+        "no scene",
+        &["--scene", "absent.toml"],
+        &["absent.toml"],
+    );
+    serve(
+        &workbench,
+        "no such shipped scene",
+        &["--scene", "no-such-scene"],
+        &["no-such-scene", "peg-in-a-hole"],
     );
 
     // Whichever of the two ports is taken, the other one is given back.
@@ -380,4 +397,5 @@ fn a_server_that_is_not_there_is_named() {
             &["haptic pc"],
         );
     }
+    assert!(!workbench.directory().join("trace.csv").exists());
 }

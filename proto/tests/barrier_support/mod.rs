@@ -8,6 +8,8 @@ use taut_proto::barrier::{
     Succession, Successor, Swap, Turn,
 };
 
+use crate::clock::Random;
+
 const MS: u64 = 1_000_000;
 /// Step of the virtual clock, ns.
 const STEP: u64 = 100_000;
@@ -131,7 +133,7 @@ enum Packet {
 }
 
 struct Network {
-    random: u64,
+    random: Random,
     lost: u64,
     doubled: u64,
     delay: u64,
@@ -141,11 +143,7 @@ struct Network {
 
 impl Network {
     fn roll(&mut self, below: u64) -> u64 {
-        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.random;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) % below.max(1)
+        self.random.below(below.max(1))
     }
 
     fn send(&mut self, now: u64, packet: &Packet) {
@@ -224,7 +222,7 @@ impl World {
     pub fn run(&self) -> Seen {
         let mut seen = Seen::default();
         let mut network = Network {
-            random: self.seed,
+            random: Random(self.seed),
             lost: self.lost,
             doubled: self.doubled,
             delay: self.delay,

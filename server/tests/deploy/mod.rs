@@ -3,20 +3,15 @@
 mod misuse;
 
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::Child;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use flate2::read::GzDecoder;
 use taut_scene::SHIPPED_WORKBENCH;
 use toml::{Table, Value};
 
-use crate::support::{Workplace, start, taut};
-
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
+use crate::support::{Running, Workplace, taut, wait_until};
 
 const MACHINES: &str = r#"
 [[machine]]
@@ -262,16 +257,6 @@ fn a_workbench_with_faults_is_refused_with_its_lines_and_leaves_nothing() {
     assert!(said.contains("not below"), "{said}");
 }
 
-/// Ended when dropped.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 #[test]
 fn processes_of_two_archives_join_each_other() {
     let place = prepared();
@@ -280,41 +265,14 @@ fn processes_of_two_archives_join_each_other() {
     let mut bridge = command(&device, "taut-bridge.service");
     bridge.push("--json".to_owned());
     // The service waits for its server, whichever machine starts first.
-    let mut bridge = Running(start(&bridge));
-    let mut server = Running(start(&command(&haptic, "taut-serve.service")));
-    let mut said = Vec::new();
-    let mut lines = BufReader::new(server.0.stderr.take().expect("piped")).lines();
-    while !said
-        .iter()
-        .any(|line: &String| line.contains("bridge joined as"))
-    {
-        let Some(Ok(line)) = lines.next() else {
-            panic!("the server ended: {said:#?}");
-        };
-        said.push(line);
-    }
+    let bridge = Running::start(&bridge);
+    let server = Running::start(&command(&haptic, "taut-serve.service"));
+    wait_until("the bridge joins", || server.says("bridge joined as"));
     std::thread::sleep(Duration::from_millis(500));
-    interrupt(&bridge.0);
-    let begun = Instant::now();
-    while bridge.0.try_wait().expect("a child").is_none() {
-        assert!(begun.elapsed() < PATIENCE, "the bridge does not end");
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    let mut report = String::new();
-    let mut out = bridge.0.stdout.take().expect("piped");
-    out.read_to_string(&mut report).expect("text");
-    let report: serde_json::Value = serde_json::from_str(&report).expect("a report");
+    let printed = bridge.end("-INT").stdout;
+    let report: serde_json::Value = serde_json::from_slice(&printed).expect("a report");
     assert_eq!(report["sessions"], 1, "{report}");
     assert!(report["packets_received"].as_u64() > Some(0), "{report}");
-}
-
-/// Ctrl-C.
-fn interrupt(child: &Child) {
-    let pid = child.id().to_string();
-    let sent = std::process::Command::new("kill")
-        .args(["-INT", &pid])
-        .status();
-    assert!(sent.is_ok_and(|status| status.success()));
 }
 
 #[test]

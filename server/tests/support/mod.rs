@@ -1,10 +1,15 @@
 //! The program from outside: a directory to work in, and how it is started.
 
+mod running;
+
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
+
+pub(crate) use running::{Running, signal};
 
 /// A directory with a key and a workbench on free ports.
 pub(crate) struct Workplace {
@@ -64,7 +69,7 @@ pub(crate) fn workbench() -> String {
 }
 
 /// Runs the program to its end.
-pub(crate) fn taut<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
+pub(crate) fn taut<S: AsRef<OsStr>>(arguments: &[S]) -> Output {
     let child = start(arguments);
     match child.wait_with_output() {
         Ok(output) => output,
@@ -73,18 +78,22 @@ pub(crate) fn taut<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
 }
 
 /// Starts the program; what it says can be read.
-pub(crate) fn start<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Child {
-    let child = Command::new(env!("CARGO_BIN_EXE_taut"))
+pub(crate) fn start<S: AsRef<OsStr>>(arguments: &[S]) -> Child {
+    command(arguments).spawn().expect("taut starts")
+}
+
+/// The program with pipes for what it says, and without what this process's environment may tell it.
+pub(crate) fn command<S: AsRef<OsStr>>(arguments: &[S]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
+    command
         .args(arguments)
         .env_remove("TAUT_KEY_FILE")
+        .env_remove("TAUT_LOG")
+        .env_remove("RUST_LOG")
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn();
-    match child {
-        Ok(child) => child,
-        Err(error) => panic!("taut does not start: {error}"),
-    }
+        .stderr(Stdio::piped());
+    command
 }
 
 /// The shipped workbench on free ports, with these keys instead of its own.

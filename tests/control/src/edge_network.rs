@@ -1,5 +1,6 @@
 //! A way of the network under a virtual clock: the bytes that a socket would carry, sealed, late, out of order and sometimes lost.
 
+use taut_method_tests::hand::Random;
 use taut_proto::header::MAX_DATAGRAM_BYTES;
 use taut_proto::seal::{KEY_MATERIAL_BYTES, Opener, Sealer};
 use taut_proto::{DecodeError, Payload};
@@ -32,7 +33,7 @@ pub struct Way {
     impairment: Impairment,
     sealer: Sealer,
     opener: Opener,
-    random: u64,
+    random: Random,
     /// Arrival time, number of the send, bytes.
     under_way: Vec<(u64, u64, Vec<u8>)>,
     sends: u64,
@@ -48,7 +49,7 @@ impl Way {
             impairment,
             sealer: Sealer::new(&material, 1, 0),
             opener: Opener::new(&material, 1, 0),
-            random: seed,
+            random: Random(seed),
             under_way: Vec::new(),
             sends: 0,
             bytes: 0,
@@ -72,8 +73,8 @@ impl Way {
         };
         self.sends += 1;
         self.bytes += datagram.len() as u64;
-        let lost = self.roll() < self.impairment.loss;
-        let late = (self.roll() * self.impairment.jitter_ns as f64) as u64;
+        let lost = self.random.unit() < self.impairment.loss;
+        let late = (self.random.unit() * self.impairment.jitter_ns as f64) as u64;
         if !lost {
             let arrival = now_ns + self.impairment.delay_ns + late;
             self.under_way.push((arrival, self.sends, datagram));
@@ -102,15 +103,6 @@ impl Way {
     #[must_use]
     pub fn sent(&self) -> (u64, u64) {
         (self.sends, self.bytes)
-    }
-
-    /// In [0, 1), by SplitMix64.
-    fn roll(&mut self) -> f64 {
-        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.random;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 

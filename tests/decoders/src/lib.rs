@@ -1,7 +1,7 @@
 //! Every decoder of taut that takes bytes from outside: packets, files, reports.
 //!
 //! A [`Decoder`] is fed bytes; it must read them or refuse them, never panic, and what it reads must keep the promise that its function
-//! states. Two users: the targets in `tests/fuzz`, which search with coverage for as long as they are let, and the test of this package, which
+//! states. Two users: the target in `tests/fuzz`, which searches with coverage for as long as it is let, and the test of this package, which
 //! changes golden samples by a seed for a fixed number of times and watches the memory.
 #![forbid(unsafe_code)]
 
@@ -17,7 +17,7 @@ mod wire;
 /// Something that takes bytes from outside.
 #[derive(Clone, Copy, Debug)]
 pub struct Decoder {
-    /// Name, also of the fuzz target and of its corpus.
+    /// Name, also of its corpus.
     pub name: &'static str,
     /// Reads or refuses the bytes.
     ///
@@ -155,7 +155,7 @@ const fn decoder(
 /// The decoder of this name.
 ///
 /// # Panics
-/// When there is none: a fuzz target is misnamed.
+/// When there is none.
 #[must_use]
 pub fn named(name: &str) -> Decoder {
     let found = DECODERS.into_iter().find(|decoder| decoder.name == name);

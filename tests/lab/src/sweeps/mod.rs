@@ -3,16 +3,11 @@
 //! A sweep writes `sweep-NAME.csv`, and `sweep-NAME.svg` with a panel for each recipe. Everything but what it sweeps is as in
 //! [`Scene::fitted`](crate::method::Scene::fitted).
 
-mod adaptation;
-mod ccd_tolerance;
 mod files;
-mod implicit_rounds;
-mod look_ahead;
 mod mesh_level;
-mod share;
+mod settings;
 mod solver_limits;
 mod solvers;
-mod update_rate;
 mod wire;
 
 use god_object::Settings;
@@ -30,12 +25,12 @@ use crate::store::{Store, recipe_key};
 
 /// All, most telling first.
 pub const SWEEPS: [Sweep; 10] = [
-    share::SWEEP,
-    implicit_rounds::SWEEP,
-    update_rate::SWEEP,
-    look_ahead::SWEEP,
-    adaptation::SWEEP,
-    ccd_tolerance::SWEEP,
+    settings::SHARE,
+    settings::ROUNDS,
+    settings::RATE,
+    settings::LOOK_AHEAD,
+    settings::ADAPTATION,
+    settings::CCD_TOLERANCE,
     solvers::SWEEP,
     solver_limits::SWEEP,
     mesh_level::SWEEP,

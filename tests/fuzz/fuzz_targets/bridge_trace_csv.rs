@@ -1,6 +1,0 @@
-//! Feeds the decoder `bridge_trace_csv` of `taut-decoders`.
-#![no_main]
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    (taut_decoders::named("bridge_trace_csv").feed)(bytes);
-});

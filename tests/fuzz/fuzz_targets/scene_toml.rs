@@ -1,6 +1,0 @@
-//! Feeds the decoder `scene_toml` of `taut-decoders`.
-#![no_main]
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    (taut_decoders::named("scene_toml").feed)(bytes);
-});
