@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::support::{box_body, box_obstacle, box_on_table, penetrates};
-use god_object::nalgebra::{UnitQuaternion, Vector3};
+use god_object::nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
 use god_object::{Coupling, GodObject, Pose, ProjectionStatus, Settings, World};
 use proptest::prelude::*;
@@ -256,6 +256,41 @@ fn a_start_however_near_is_refused_or_the_body_can_leave() {
         }
     }
     assert!(refused > 20 && left > 100, "{refused} {left}");
+}
+
+#[test]
+fn half_a_turn_at_once_is_half_a_turn() {
+    let world = box_on_table();
+    let settings = Settings {
+        k_s: 1.0,
+        ..Settings::for_size(0.04)
+    };
+    let axes = [
+        Vector3::x(),
+        Vector3::y(),
+        Vector3::z(),
+        -Vector3::z(),
+        Vector3::new(0.6, 0.0, 0.8),
+        Vector3::new(0.36, 0.48, -0.8),
+    ];
+    // Free, and so near that the corners pass the table by a tenth of a millimetre.
+    for height in [0.5, 0.0301] {
+        for axis in axes {
+            let start = at(0.0, 0.0, height);
+            let mut god_object =
+                GodObject::new(world.clone(), settings, start).expect("a free start");
+            let half_turn = Quaternion::from_imag(axis);
+            let device =
+                Pose::from_parts(start.translation, UnitQuaternion::new_unchecked(half_turn));
+            let report = god_object.step(&device, None);
+            let off = god_object.pose().rotation.angle_to(&device.rotation);
+            assert!(off < 1e-6, "{axis} at {height}: {off}");
+            assert!(
+                report.substeps <= 2 && !report.unfinished,
+                "{axis} at {height}: {report:?}"
+            );
+        }
+    }
 }
 
 #[test]
