@@ -97,7 +97,7 @@ pub struct Settings {
     /// A motion whose fastest point covers less than this is none, m; and a constraint that a motion violates by less than a thousandth of it is
     /// left out of a set whose rows are chosen.
     pub motion_tolerance: f64,
-    /// Capacity of the constraint set. The nearest are kept and the set says that it is truncated.
+    /// Capacity of the constraint set. Where it does not hold every row, the set says that it is truncated.
     pub max_constraints: usize,
     /// Most repetitions of project, move, collect within one update.
     pub max_substeps: u32,

@@ -60,12 +60,6 @@ impl TurnMemory {
             short + axis * (left + kept(left))
         })
     }
-
-    /// The rotation vector of the last difference on the branch that is kept: of at most a whole turn.
-    #[inline]
-    pub(crate) fn branch(&self) -> Vector3<f64> {
-        self.axis.map_or(self.last, |axis| self.last + axis * TAU)
-    }
 }
 
 /// The pull the way that the device went, `left` from the whole turn, rad.
@@ -122,7 +116,6 @@ mod tests {
         let pull = memory.pull(&tilted);
         assert!(pull.x > 0.05, "towards the device's tilt: {pull}");
         assert!(pull.z > 0.9, "the way that the device went: {pull}");
-        assert!((memory.branch().z - 300_f64.to_radians()).abs() < 0.1);
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! The whole method on a box over a table: forces in closed form, invariants on any input.
 
-use crate::support::{box_on_table, penetrates};
-use god_object::nalgebra::{UnitQuaternion, Vector3};
+use std::sync::Arc;
+
+use crate::support::{box_body, box_obstacle, box_on_table, penetrates};
+use god_object::nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
-use god_object::{Coupling, GodObject, Pose, ProjectionStatus, Settings};
+use god_object::{Coupling, GodObject, Pose, ProjectionStatus, Settings, World};
 use proptest::prelude::*;
 
 const HALF_HEIGHT: f64 = 0.01;
@@ -210,6 +212,85 @@ fn starting_inside_an_obstacle_is_refused_by_name() {
     // Wholly inside: no triangles cross.
     let refused = GodObject::new(world, Settings::for_size(0.04), at(0.0, 0.0, -0.05));
     assert!(refused.is_err_and(|e| e.to_string().contains("table")));
+}
+
+/// Lower, the collision search could tell no motion from one into the table: the body stayed where it was, whatever the hand did.
+#[test]
+fn a_start_however_near_is_refused_or_the_body_can_leave() {
+    let half = 0.1;
+    let settings = Settings::for_size(2.0 * half);
+    let (mut refused, mut left) = (0, 0);
+    for top in [0.0, 0.1, 1.0, 100.1, 1e4] {
+        for exponent in -17..=-3 {
+            for digit in [1.0, 2.0, 5.0] {
+                let gap = digit * 10.0_f64.powi(exponent);
+                let world = Arc::new(World {
+                    body: box_body(Vector3::repeat(half)),
+                    obstacles: vec![box_obstacle(
+                        "table",
+                        Vector3::new(0.5, 0.5, 0.05),
+                        Vector3::new(0.0, 0.0, top - 0.05),
+                    )],
+                });
+                let start = top + half + gap;
+                let mut god_object = match GodObject::new(world, settings, at(0.0, 0.0, start)) {
+                    Ok(god_object) => god_object,
+                    Err(error) => {
+                        assert!(gap < settings.minimum_gap && error.to_string().contains("table"));
+                        refused += 1;
+                        continue;
+                    }
+                };
+                for push in [0.0, -0.01] {
+                    for _ in 0..10 {
+                        god_object.step(&at(0.0, 0.0, start + push), None);
+                    }
+                }
+                for _ in 0..40 {
+                    god_object.step(&at(0.0, 0.0, start + 0.1), None);
+                }
+                let height = god_object.pose().translation.vector.z - start;
+                assert!(height > 0.09, "{gap} m above {top} m: risen by {height} m");
+                left += 1;
+            }
+        }
+    }
+    assert!(refused > 20 && left > 100, "{refused} {left}");
+}
+
+#[test]
+fn half_a_turn_at_once_is_half_a_turn() {
+    let world = box_on_table();
+    let settings = Settings {
+        k_s: 1.0,
+        ..Settings::for_size(0.04)
+    };
+    let axes = [
+        Vector3::x(),
+        Vector3::y(),
+        Vector3::z(),
+        -Vector3::z(),
+        Vector3::new(0.6, 0.0, 0.8),
+        Vector3::new(0.36, 0.48, -0.8),
+    ];
+    // Free, and so near that the corners pass the table by a tenth of a millimetre.
+    for height in [0.5, 0.0301] {
+        for axis in axes {
+            let start = at(0.0, 0.0, height);
+            let mut god_object =
+                GodObject::new(world.clone(), settings, start).expect("a free start");
+            let half_turn = Quaternion::from_imag(axis);
+            let device =
+                Pose::from_parts(start.translation, UnitQuaternion::new_unchecked(half_turn));
+            let report = god_object.step(&device, None);
+            let off = god_object.pose().rotation.angle_to(&device.rotation);
+            assert!(off < 1e-6, "{axis} at {height}: {off}");
+            assert!(
+                report.substeps <= 2 && !report.unfinished,
+                "{axis} at {height}: {report:?}"
+            );
+        }
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! or three-dimensional search on the true geometry; its force is `k_h k_s M (x - x_h)`.
 
 use crate::geometry_shapes;
+use crate::shape_support::Form;
 
 use std::sync::Arc;
 
@@ -328,6 +329,61 @@ fn on_a_long_bar_that_is_swept_far_rounds_that_do_not_converge_give_way_to_the_l
         if turn > 2.3 {
             let apart = size(&(rounds - linear)) / size(&linear);
             assert!(apart < 1e-12, "{apart} from the linear rows at {turn} rad");
+        }
+    }
+}
+
+/// A bar between pins with a little play, and a hand that winds it up: sets that were made before the bar came to the pins have rounds, those of the
+/// bar at rest have none, and both pull the same way.
+#[test]
+fn a_hand_that_winds_up_a_held_bar_feels_no_jump_where_rounds_set_in() {
+    let half = Vector3::new(0.05, 0.005, 0.005);
+    let (radius, arm, play) = (0.004, 0.04, 1e-4);
+    let up = half.z + radius + play;
+    let pins = [(arm, up), (arm, -up), (-arm, up), (-arm, -up)];
+    let pin = |(x, z): (f64, f64)| {
+        Form::Cylinder(radius, 0.02).obstacle("pin", Pose::translation(x, 0.0, z))
+    };
+    let world = Arc::new(World {
+        body: box_body(half),
+        obstacles: pins.map(pin).into(),
+    });
+    let loops = |rounds: u32| Settings {
+        adaptation: None,
+        rotation_metric: RotationMetric::RadiusOfGyration(GYRATION),
+        ..settings(rounds)
+    };
+    let god_object =
+        || GodObject::new(world.clone(), loops(2), Pose::identity()).expect("a free start");
+    let (in_the_middle, mut at_the_pins) = (god_object(), god_object());
+    let mut couplings = [0, 2].map(|rounds| Coupling::new(&world, &loops(rounds)));
+    let stiffness = loops(2).stiffness(1.0) * GYRATION * GYRATION;
+    let (step, off) = (1_f64.to_radians(), play / arm);
+    let mut last = [Vector3::zeros(); 2];
+    for degrees in 0..=345 {
+        let turn = f64::from(degrees).to_radians();
+        let device = Pose::rotation(Vector3::y() * turn);
+        at_the_pins.step(&device, None);
+        let set = if degrees / 10 % 2 == 0 {
+            at_the_pins.constraint_set()
+        } else {
+            in_the_middle.constraint_set()
+        };
+        let torques = couplings
+            .each_mut()
+            .map(|coupling| angular(&coupling.step(turn, &device, set).wrench));
+        let [linear, rounds] = torques;
+        assert!(
+            (linear - rounds).norm() <= 0.1 * stiffness * off,
+            "{rounds} N m instead of {linear} N m at {degrees} degrees"
+        );
+        for (torque, last) in torques.iter().zip(&mut last) {
+            // The pull's slope is below 1.5, and from the middle the bar has the way to the pins before it.
+            let jump = (torque - std::mem::replace(last, *torque)).norm();
+            assert!(
+                jump <= stiffness * (1.5 * (step + off) + off),
+                "a step of {jump} N m at {degrees} degrees"
+            );
         }
     }
 }

@@ -182,6 +182,60 @@ fn few_rows_give_the_force_of_all_that_are_within_reach() {
 }
 
 #[test]
+fn a_set_with_little_room_has_what_holds_the_device_and_tells_what_it_dropped() {
+    let world = peg_in_hole();
+    for max_constraints in [8, 32, 64, 1024] {
+        let settings = Settings {
+            max_constraints,
+            ..settings(0.05)
+        };
+        let mut god_object =
+            GodObject::new(Arc::clone(&world), settings, hole_pose()).expect("a free start");
+        let mut coupling = Coupling::new(&world, &settings);
+        let radius = world.body.mesh.radius_about(&Point3::origin());
+        let (mut compared, mut told) = (0, 0);
+        for k in 0..STEPS {
+            let device = hand(k);
+            let report = god_object.step(&device, None);
+            let set = god_object.constraint_set();
+            assert!(set.constraints.len() <= max_constraints);
+            told += usize::from(set.truncated);
+            if !set.truncated {
+                assert!(set.reduction_error <= settings.rest_distance, "step {k}");
+            }
+            if !k.is_multiple_of(10) {
+                continue;
+            }
+            assert!(
+                !report.unfinished,
+                "step {k} with room for {max_constraints}"
+            );
+            let felt = coupling.step(k as f64 * 1e-3, &device, set);
+            let difference = pose_difference(&device, god_object.pose(), &Vector3::zeros());
+            let reach = linear(&difference).norm()
+                + radius * angular(&difference).norm()
+                + 2.0 * settings.rest_distance;
+            let rows = every_row(&world, god_object.pose(), reach, settings.rest_distance);
+            let a_c = projected(&world, &god_object, &rows, &difference);
+            let expected = (linear(&a_c) - linear(&difference)) * settings.stiffness(1.0);
+            let error = (linear(&felt.wrench) - expected).norm();
+            assert!(
+                error <= 0.01 * expected.norm().max(0.2),
+                "step {k} with room for {max_constraints}: off by {error} N of {} N",
+                expected.norm()
+            );
+            compared += usize::from(expected.norm() > 0.5);
+        }
+        assert!(compared > 15, "{compared}");
+        assert!(
+            told == 0 || max_constraints < 64,
+            "{max_constraints}: {told}"
+        );
+        assert!(told > 0 || max_constraints > 8, "{max_constraints}: {told}");
+    }
+}
+
+#[test]
 fn rough_walls_are_felt_as_by_all_rows_however_fast_the_peg_slides() {
     let peg = roughened(fine_peg(10e-3, 30e-3, 120, 112), 1e-6, 1);
     let hole = roughened(fine_hole(10.1e-3, 30e-3, 25e-3, 120, 109), 1e-6, 2);

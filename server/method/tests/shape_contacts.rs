@@ -38,6 +38,38 @@ fn contacts(form: Form, at: &Pose, obstacle: Form, pose: &Pose, distance: f64) -
     out
 }
 
+#[test]
+fn a_collection_is_complete_no_farther_than_what_found_room() {
+    let (cube, plane, distance) = (Form::Cube(0.02), Form::Plane, 0.01);
+    let tilted = turned(Vector3::new(1.0, 0.4, 0.0), 1e-3);
+    let pose = at(0.0, 0.0, 0.025, tilted);
+    let all = contacts(cube, &pose, plane, &Pose::identity(), distance);
+    assert_eq!(all.len(), 4);
+    for room in 1..=5 {
+        let mut out = Vec::with_capacity(room);
+        let collected = shape::collect(
+            &cube.body(),
+            &pose,
+            &plane.obstacle("obstacle", Pose::identity()),
+            &Pose::identity(),
+            7,
+            distance,
+            &mut CollisionWorkspace::new(),
+            &mut out,
+            &mut Work::default(),
+        );
+        let kept = all.len().min(out.capacity());
+        assert_eq!(out, all[..kept]);
+        assert_eq!(collected.truncated, kept < all.len());
+        let within = if kept < all.len() {
+            all[kept - 1].gap
+        } else {
+            distance
+        };
+        assert_eq!(collected.complete_within, within);
+    }
+}
+
 fn lies() -> UnitQuaternion<f64> {
     UnitQuaternion::identity()
 }

@@ -56,7 +56,7 @@ pub struct ConstraintSet {
     pub constraints: Vec<NonPenetrationConstraint>,
     /// Smallest distance between the bodies, m; infinite when none is within the activation distance.
     pub gap_min: f64,
-    /// The capacity did not hold every row; the nearest were kept.
+    /// The capacity did not hold every row: the nearest were kept or, where rows are chosen, those of the body's motion and of the device's pose.
     pub truncated: bool,
     /// Every facing pair nearer than this was looked at, m: rows of pairs farther apart may be missing. Infinite without an obstacle.
     pub complete_within: f64,
@@ -64,7 +64,7 @@ pub struct ConstraintSet {
     /// violated by a motion that the rows were chosen for, m; zero for a full set. Those motions are the projected ways to the device's pose at the update, and to poses that lie off it by
     /// the activation distance and the device's last path, along and about each axis. The way to a pose that is a metric distance d off one
     /// of these violates pair k by at most `|J_k| d` more, in the inverse metric: projections bring nothing farther apart. Infinite where one of the
-    /// projections has no certificate.
+    /// projections has no certificate, and where rows of one found no room.
     pub reduction_error: f64,
     /// The rows made ready for the coupling, see [`ConstraintSet::prepare`].
     pub(crate) prepared: PreparedRows,

@@ -6,7 +6,7 @@ use super::Coupling;
 use crate::constraint::ConstraintSet;
 use crate::implicit::LinearAnswer;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Metric, Projection, ProjectionStatus};
-use crate::spatial::{Pose, Vector6, angular, pose_difference};
+use crate::spatial::{Pose, Vector6, advance_pose, angular, pose_difference};
 use crate::surface::FrictionProblem;
 
 /// What holds the body, and where.
@@ -21,11 +21,10 @@ pub(super) struct Answer {
 }
 
 impl Coupling {
-    /// The answer for a device (pose of the reference point) that asks for `unconstrained`; the status where nothing certified is found.
+    /// The answer for a device that asks for `unconstrained`; the status where nothing certified is found.
     pub(super) fn constrained(
         &mut self,
         metric: &Metric,
-        device: &Pose,
         unconstrained: &Vector6,
         set: &ConstraintSet,
     ) -> Result<Answer, ProjectionStatus> {
@@ -47,7 +46,7 @@ impl Coupling {
         let held = metric.mass_matrix_times(&(projection.acceleration - unconstrained));
         let damped = self.damped(metric, unconstrained, set, &projection);
         let mut answer = self.relinearised(
-            device,
+            unconstrained,
             set,
             Answer {
                 projection,
@@ -120,13 +119,24 @@ impl Coupling {
 
     /// The answer with its rows, and friction on them, linearised anew where it leads to, as often as the settings allow. Rounds that do not converge
     /// give way to the linear rows, without a step between.
-    fn relinearised(&mut self, device: &Pose, set: &ConstraintSet, linear: Answer) -> Answer {
+    fn relinearised(
+        &mut self,
+        unconstrained: &Vector6,
+        set: &ConstraintSet,
+        linear: Answer,
+    ) -> Answer {
+        if self.settings.implicit_rounds == 0 {
+            return linear;
+        }
         let (god_object, k_s) = (self.present.god_object, self.settings.k_s);
+        // Past the half turn the device pulls as if it were elsewhere.
+        let difference = unconstrained / k_s;
+        let goal = advance_pose(&god_object, &difference, 1.0);
         let given = LinearAnswer {
             constraints: &set.constraints[..self.bounds.len()],
             start: &god_object,
-            goal: device,
-            branch: self.turn.branch(),
+            goal: &goal,
+            branch: angular(&difference),
             scale: k_s,
             shaded: self.present.shaded,
             projection: &linear.projection,

@@ -159,7 +159,7 @@ impl Coupling {
             return self.without_force(ProjectionStatus::NotFinite, new_sample);
         };
         self.adapt(time, &unconstrained, set);
-        let answer = match self.constrained(&metric, &device, &unconstrained, set) {
+        let answer = match self.constrained(&metric, &unconstrained, set) {
             Ok(answer) => answer,
             Err(status) => return self.without_force(status, new_sample),
         };

@@ -166,7 +166,7 @@ impl GodObject {
         if self.reduction.is_none() {
             self.afford_look_ahead(distance, self.given.looked_at);
         } else if let (Some(at), Some(reduction)) = (self.place(), &mut self.reduction) {
-            reduction.give(&at, &self.given.rows);
+            reduction.give(&at, &self.given.rows, most);
         }
     }
 

@@ -3,6 +3,7 @@
 use super::placed_obstacle::PlacedObstacle;
 use super::{GodObject, StepReport};
 use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
+use crate::settings::Settings;
 use crate::shape;
 
 impl GodObject {
@@ -13,7 +14,7 @@ impl GodObject {
         goes_along: impl Fn(&PlacedObstacle) -> bool,
         report: &mut StepReport,
     ) -> f64 {
-        let settings = self.advancement();
+        let settings = Self::advancement(&self.settings);
         let mut free = 1.0;
         for (obstacle, placed) in self.world.obstacles.iter().zip(&self.obstacles) {
             if goes_along(placed) {
@@ -45,11 +46,11 @@ impl GodObject {
     }
 
     /// Tolerances and limits of the collision searches.
-    pub(super) fn advancement(&self) -> AdvancementSettings {
+    pub(super) fn advancement(settings: &Settings) -> AdvancementSettings {
         AdvancementSettings {
-            minimum_gap: self.settings.minimum_gap,
-            gap_tolerance: self.settings.gap_tolerance,
-            max_iterations: self.settings.max_advancement_steps,
+            minimum_gap: settings.minimum_gap,
+            gap_tolerance: settings.gap_tolerance,
+            max_iterations: settings.max_advancement_steps,
             ..AdvancementSettings::default()
         }
     }

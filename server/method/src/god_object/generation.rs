@@ -165,6 +165,10 @@ impl GodObject {
             if self.search(&mut reduction, &at, searched, purpose, work) {
                 self.answers(&mut reduction, &at, motions, purpose, work);
             }
+            if reduction.is_full() {
+                // The first motion is the one that is made, or where the device is: others may have taken the place of its rows.
+                self.answers(&mut reduction, &at, &motions[..1], purpose, work);
+            }
         }
         self.reduction = Some(reduction);
         self.write_set();
@@ -204,6 +208,9 @@ impl GodObject {
         let mut projected = self.project(unconstrained, ahead, report)?;
         let led_elsewhere = ahead.is_some() || self.friction.as_ref().is_some_and(Friction::acts);
         for _ in 0..MAX_ADDED {
+            if led_elsewhere {
+                self.use_active_rows();
+            }
             // Rows that contradict each other do so with more of them, too.
             let added = led_elsewhere
                 && projected.feasible
@@ -213,12 +220,19 @@ impl GodObject {
             }
             projected = self.project(unconstrained, ahead, report)?;
         }
-        if led_elsewhere && let Some(reduction) = &mut self.reduction {
+        if led_elsewhere {
+            self.use_active_rows();
+        }
+        Some(projected)
+    }
+
+    /// The rows that hold the last answer stay known.
+    fn use_active_rows(&mut self) {
+        if let Some(reduction) = &mut self.reduction {
             for row in &self.warm_start {
                 reduction.use_row(&self.set.constraints[*row as usize].features);
             }
         }
-        Some(projected)
     }
 
     fn add_violated(&mut self, answer: &Vector6, ahead: Option<&Ahead>, work: &mut Work) -> bool {
@@ -271,8 +285,7 @@ impl GodObject {
         self.set.complete_within = within.min(self.given.complete_within);
         self.set.constraints.clear();
         self.set.constraints.extend_from_slice(self.given.rows());
-        let room = self.settings.max_constraints - self.given.rows().len();
-        for contact in reduction.contacts().take(room) {
+        for contact in reduction.contacts() {
             let index = usize::from(contact.features.obstacle);
             let row = self.row_of(index, contact);
             self.set.constraints.push(row);

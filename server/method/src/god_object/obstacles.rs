@@ -187,7 +187,7 @@ impl GodObject {
 
     /// Every obstacle goes `share` of its way, as far as it is free of the body. The longest path made, m.
     fn advance_obstacles(&mut self, share: f64, report: &mut StepReport) -> f64 {
-        let settings = self.advancement();
+        let settings = Self::advancement(&self.settings);
         let mut longest: f64 = 0.0;
         for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
             if !placed.is_moving() {

@@ -195,7 +195,6 @@ impl GodObject {
         let goal = advance_pose(&start, &unconstrained, 1.0);
 
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
-        let mut branch = angular(&unconstrained);
         let all_moved = device_moved + obstacles_moved;
         let mut update = Update {
             all_moved,
@@ -203,6 +202,7 @@ impl GodObject {
             went_along,
             look_ahead: all_moved,
             made: 0.0,
+            branch: angular(&unconstrained),
             step_memory: StepMemory::default(),
             reversals: 0,
         };
@@ -216,8 +216,8 @@ impl GodObject {
                 break;
             }
             report.substeps += 1;
-            let left = pose_difference(&goal, &self.pose_at_reference_point(), &branch);
-            branch = angular(&left);
+            let left = pose_difference(&goal, &self.pose_at_reference_point(), &update.branch);
+            update.branch = angular(&left);
             if !self.substep(&left, &mut update, &mut report) {
                 report.unfinished = false;
                 break;

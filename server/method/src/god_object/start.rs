@@ -1,10 +1,11 @@
 //! Whether a god-object can start where it is, and why not.
 
 use super::GodObject;
+use crate::collision::{CollisionWorkspace, Motion, TimeOfImpact, Work};
 use crate::settings::{Settings, SettingsError};
-use crate::shape::{PrimitiveError, check_primitives, shapes_intersect};
-use crate::spatial::{Pose, pose_is_finite};
-use crate::world::World;
+use crate::shape::{self, PrimitiveError, check_primitives, shapes_intersect};
+use crate::spatial::{Pose, Vector6, at_reference_point, pose_is_finite};
+use crate::world::{Body, Obstacle, World};
 
 /// Why a god-object cannot start.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -16,6 +17,16 @@ pub enum StartError {
     Penetration {
         /// The obstacle's name.
         obstacle: String,
+    },
+    /// The body starts so near to an obstacle that no search can tell a motion which leaves it from one that does not.
+    #[error(
+        "the god-object starts {gap:.0e} m from obstacle \"{obstacle}\", which is rounding at coordinates as large as these: move god_object.pose until they are farther apart, or the scene nearer to its origin"
+    )]
+    TooNear {
+        /// The obstacle's name.
+        obstacle: String,
+        /// Distance of the nearest features that face each other, m.
+        gap: f64,
     },
     /// The start pose has a component that is not a finite number.
     #[error("the god-object's start pose is not finite: give numbers in god_object.pose")]
@@ -54,13 +65,66 @@ impl GodObject {
             });
         }
         check_primitives(world).map_err(|(name, error)| StartError::Primitive { name, error })?;
+        let workspace = &mut CollisionWorkspace::new();
         for obstacle in &world.obstacles {
             if shapes_intersect(&world.body, start, obstacle, &obstacle.pose) {
                 return Err(StartError::Penetration {
                     obstacle: obstacle.name.clone(),
                 });
             }
+            if !can_stay(&world.body, settings, start, obstacle, workspace) {
+                return Err(StartError::TooNear {
+                    obstacle: obstacle.name.clone(),
+                    gap: gap(&world.body, settings, start, obstacle, workspace),
+                });
+            }
         }
         Ok(())
     }
+}
+
+/// Whether the search that motions go through grants the one that is none: otherwise it grants none at all, and the body would stay for ever.
+fn can_stay(
+    body: &Body,
+    settings: &Settings,
+    start: &Pose,
+    obstacle: &Obstacle,
+    workspace: &mut CollisionWorkspace,
+) -> bool {
+    let reference_point = body.reference_point;
+    let found = shape::time_of_impact(
+        body,
+        &Motion {
+            start: at_reference_point(start, &reference_point),
+            displacement: Vector6::zeros(),
+            reference_point,
+        },
+        obstacle,
+        &obstacle.pose,
+        &GodObject::advancement(settings),
+        workspace,
+        &mut Work::default(),
+    );
+    found == TimeOfImpact::Separated
+}
+
+fn gap(
+    body: &Body,
+    settings: &Settings,
+    start: &Pose,
+    obstacle: &Obstacle,
+    workspace: &mut CollisionWorkspace,
+) -> f64 {
+    let collected = shape::collect(
+        body,
+        start,
+        obstacle,
+        &obstacle.pose,
+        0,
+        settings.activation_distance,
+        workspace,
+        &mut Vec::with_capacity(1),
+        &mut Work::default(),
+    );
+    collected.gap_min
 }

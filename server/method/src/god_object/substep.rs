@@ -3,7 +3,7 @@
 //! A trust length keeps the linear constraints honest on curved surfaces: it shrinks where a motion was cut short, and grows
 //! where it was free.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::projection::Projected;
 use super::{GodObject, StepReport};
@@ -44,6 +44,8 @@ pub(super) struct Update {
     pub(super) look_ahead: f64,
     /// Way made by the sub-steps so far, m.
     pub(super) made: f64,
+    /// Rotation vector of what is left to turn, on the branch that the turns made so far leave, rad.
+    pub(super) branch: Vector3<f64>,
     /// Last motion and damping.
     pub(super) step_memory: StepMemory,
     /// How often a motion has turned back on the last.
@@ -135,6 +137,7 @@ impl GodObject {
         let time = self.go(&projected, &constrained, report);
         self.carry.made(time * update.step_memory.damping);
         update.made += covered * time;
+        update.branch -= angular(&constrained) * time;
 
         // 5. Collect at the pose reached: what is published, unless that looks far ahead and another sub-step is likely. Most of the work is
         // in what is near, and a set that serves the next sub-step alone is collected again when there is none.

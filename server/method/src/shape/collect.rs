@@ -127,10 +127,14 @@ pub(super) fn collect(
     let candidates = &workspace.candidates;
     let gap_min = candidates.first().map_or(f64::INFINITY, |c| c.gap);
     out.extend(candidates.iter().map(|c| in_world(c, frame)));
+    let complete_within = match candidates.last() {
+        Some(farthest) if truncated => farthest.gap,
+        _ => activation_distance,
+    };
     Collected {
         truncated,
         gap_min,
-        complete_within: activation_distance,
+        complete_within,
         looked_at: looked(work) - looked_before,
     }
 }

@@ -146,6 +146,14 @@ impl Candidates {
         }
     }
 
+    /// A pair that was a row may become one again; its contact is that of the present pose.
+    pub(super) fn put_back(&mut self, contact: &Contact) {
+        let mut all = self.contacts.iter();
+        if let Some(k) = all.position(|c| c.features == contact.features) {
+            self.gap[k] = contact.gap;
+        }
+    }
+
     /// The candidate with the least gap, and that; the first of several.
     pub(super) fn nearest(&self) -> Option<(usize, f64)> {
         let least = self.processor.dispatch(Least(&self.gap));

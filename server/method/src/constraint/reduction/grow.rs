@@ -4,9 +4,9 @@ use arrayvec::ArrayVec;
 
 use super::at::{At, Purpose, Surfaces};
 use super::neighbours::{Arrival, Sides, for_neighbours};
-use super::row::{Known, face, jacobian};
+use super::row::{Known, face};
 use super::{
-    MAX_ROUNDS, MAX_ROWS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES,
+    MAX_ROUNDS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES,
     WITNESS_REST_DISTANCES,
 };
 use crate::collision::{Placement, Work};
@@ -46,6 +46,7 @@ impl RowReduction {
                     bound: at.rest_distance - gap.max(least_gap) + nearer,
                 }));
             work.projections += 1;
+            self.now += 1;
             let projection =
                 self.projector
                     .project(&at.metric, unconstrained, &self.rows, &self.warm_start);
@@ -54,7 +55,7 @@ impl RowReduction {
                 .extend(projection.active.iter().map(|row| row.row));
             for row in &projection.active {
                 if let Some(row) = self.known.get_mut(row.row as usize) {
-                    row.idle = 0;
+                    row.note_use(self.now);
                 }
             }
             rounds += 1;
@@ -84,8 +85,8 @@ impl RowReduction {
         motion: &Vector6,
         work: &mut Work,
     ) -> bool {
-        let before = self.known.len();
-        for k in 0..before {
+        let before = self.now;
+        for k in 0..self.known.len() {
             let Contact {
                 features: pair,
                 gap,
@@ -101,24 +102,24 @@ impl RowReduction {
                 let clear = arrival
                     .over(body, obstacle, &features)
                     .is_some_and(|clearance| clearance >= at.rest_distance - at.tolerance);
-                if clear || self.known.len() == MAX_ROWS || self.knows(&features) {
+                if clear || self.knows(&features) {
                     return;
                 }
                 let Some(contact) = face(at, &features, true, work) else {
                     return;
                 };
-                let row = jacobian(&contact, &at.center());
-                let violation = at.rest_distance - contact.gap - row.dot(motion);
+                let row = Known::of(&contact, surfaces, &at.center());
+                let violation = at.rest_distance - contact.gap - row.jacobian.dot(motion);
                 if violation > at.tolerance {
-                    self.add((at, surfaces), &contact);
-                    if let Some(row) = self.known.last_mut() {
-                        // It does not face yet.
-                        row.implied = true;
-                    }
+                    // It does not face yet.
+                    self.add(Known {
+                        implied: true,
+                        ..row
+                    });
                 }
             });
         }
-        self.known.len() > before
+        self.now > before
     }
 
     /// Adds the pairs that one turned into which has slid off its features.
@@ -132,13 +133,13 @@ impl RowReduction {
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let body = &at.world.body.mesh;
         for_neighbours(body, &obstacle.mesh, pair, Sides::All, |features| {
-            if self.known.len() == MAX_ROWS || self.knows(&features) {
+            if self.knows(&features) {
                 return;
             }
             if let Some(contact) = face(at, &features, false, work)
                 && contact.gap <= near
             {
-                self.add((at, surfaces), &contact);
+                self.add(Known::of(&contact, surfaces, &at.center()));
             }
         });
     }
@@ -179,7 +180,7 @@ impl RowReduction {
                 let gap = contact.gap.max(least_gap) - nearer;
                 let violation = at.rest_distance - gap - jacobian.dot(motion);
                 if violation > at.tolerance {
-                    self.add((at, surfaces), &contact);
+                    self.add(row);
                     return violation;
                 }
             }
@@ -221,7 +222,8 @@ impl RowReduction {
                 for b in owners(mesh, b) {
                     for_contacts(&facing, &facing.pair(a, b), work, |contact| {
                         if !self.knows(&contact.features) {
-                            self.add((at, surfaces), &in_world(&contact, pose));
+                            let contact = in_world(&contact, pose);
+                            self.add(Known::of(&contact, surfaces, &at.center()));
                         }
                     });
                 }

@@ -48,7 +48,7 @@ use row::{Known, face, felt, jacobian};
 
 /// Candidates that searches may add to those that were collected.
 const SEARCHED: usize = 4096;
-/// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
+/// Most rows known at a time, where a set has room for so many. A projection holds six; the rest are those of the probes, and of updates before.
 pub(crate) const MAX_ROWS: usize = 160;
 /// So many candidates all become rows of a published set.
 const FEW: usize = 64;
@@ -76,6 +76,10 @@ pub(crate) struct RowReduction {
     projector: Projector,
     candidates: Candidates,
     known: Vec<Known>,
+    /// Most rows known at a time: as many as the set has room for.
+    room: usize,
+    /// Counts projections and rows added.
+    now: u64,
     /// Rows of the pairs that are not chosen from: Jacobian and gap, m.
     given: Vec<(Vector6, f64)>,
     rows: Vec<HalfSpace>,
@@ -103,6 +107,8 @@ impl RowReduction {
             projector: Projector::new(SolverKind::ActiveSet, most),
             candidates: Candidates::with_capacity(candidates + SEARCHED),
             known: Vec::with_capacity(MAX_ROWS),
+            room: MAX_ROWS.min(candidates),
+            now: 0,
             given: Vec::with_capacity(candidates),
             rows: Vec::with_capacity(most),
             warm_start: Vec::with_capacity(6),
@@ -121,7 +127,7 @@ impl RowReduction {
         self.known.iter().map(|row| &row.contact)
     }
 
-    /// Largest violation that a completed motion was left with since the last call of [`Self::move_to`], m.
+    /// Largest violation that a completed motion was left with since the last call of [`Self::move_to`], m; infinite where rows of it found no room.
     pub(crate) fn error(&self) -> f64 {
         self.error
     }
@@ -194,8 +200,20 @@ impl RowReduction {
         self.candidates.set_surfaces(&center, surfaces);
     }
 
-    /// Rows of the present pose that hold beside those that are chosen.
-    pub(crate) fn give(&mut self, at: &At, rows: &[NonPenetrationConstraint]) {
+    /// Whether one row more would take the place of another.
+    pub(crate) fn is_full(&self) -> bool {
+        self.known.len() >= self.room
+    }
+
+    /// Rows of the present pose that hold beside those that are chosen, in a set of at most `capacity` rows.
+    pub(crate) fn give(&mut self, at: &At, rows: &[NonPenetrationConstraint], capacity: usize) {
+        self.room = MAX_ROWS.min(capacity.saturating_sub(rows.len()));
+        while self.known.len() > self.room
+            && let Some(place) = self.least_recently_used()
+        {
+            let dropped = self.known.swap_remove(place);
+            self.note_dropped(&dropped);
+        }
         let center = at.center();
         self.given.clear();
         self.given.extend(rows.iter().map(|row| {
@@ -212,9 +230,9 @@ impl RowReduction {
         purpose: Purpose,
         work: &mut Work,
     ) -> bool {
-        let before = self.known.len();
-        let violation = self.add_most_violated((at, surfaces), answer, purpose, work);
-        violation > at.tolerance && self.known.len() > before
+        let before = self.now;
+        self.add_most_violated((at, surfaces), answer, purpose, work);
+        self.now > before
     }
 
     /// Whether a pair that mattered has left the features that it was of, so that the candidates are to be collected anew.
@@ -254,9 +272,10 @@ impl RowReduction {
 
     /// Makes every candidate a row where they are few; false where they are many. At the pose where they were collected.
     pub(crate) fn take_all(&mut self, (at, surfaces): (&At, &dyn Surfaces)) -> bool {
-        if self.candidates.contacts.len() > FEW {
+        if self.candidates.contacts.len() > FEW.min(self.room) {
             return false;
         }
+        self.now += 1;
         for k in 0..self.candidates.contacts.len() {
             let contact = self.candidates.contacts[k];
             match self
@@ -264,8 +283,8 @@ impl RowReduction {
                 .iter_mut()
                 .find(|row| row.contact.features == contact.features)
             {
-                Some(row) => row.idle = 0,
-                None => self.add((at, surfaces), &contact),
+                Some(row) => row.note_use(self.now),
+                None => self.add(Known::of(&contact, surfaces, &at.center())),
             }
         }
         true
@@ -275,7 +294,7 @@ impl RowReduction {
     pub(crate) fn use_row(&mut self, features: &FeaturePair) {
         let mut rows = self.known.iter_mut();
         if let Some(row) = rows.find(|row| row.contact.features == *features) {
-            row.idle = 0;
+            row.note_use(self.now);
         }
     }
 
@@ -292,14 +311,31 @@ impl RowReduction {
         });
     }
 
-    fn add(&mut self, (at, surfaces): (&At, &dyn Surfaces), contact: &Contact) {
-        if self.known.len() == MAX_ROWS {
-            let most_idle = (0..MAX_ROWS)
-                .max_by_key(|k| self.known[*k].idle)
-                .unwrap_or(0);
-            self.known.swap_remove(most_idle);
-            self.truncated = true;
+    /// Where there is no room, it takes the place of the row that was of no use for longest: never of one that holds the last answer.
+    fn add(&mut self, row: Known) {
+        self.now += 1;
+        let row = Known {
+            used: self.now,
+            ..row
+        };
+        if !self.is_full() {
+            self.known.push(row);
+        } else if let Some(place) = self.least_recently_used() {
+            let dropped = std::mem::replace(&mut self.known[place], row);
+            self.note_dropped(&dropped);
         }
-        self.known.push(Known::of(contact, surfaces, &at.center()));
+    }
+
+    fn least_recently_used(&self) -> Option<usize> {
+        (0..self.known.len()).min_by_key(|k| self.known[*k].used)
+    }
+
+    /// What motions of this update needed may be violated by them now; what they did not is no loss.
+    fn note_dropped(&mut self, row: &Known) {
+        self.candidates.put_back(&row.contact);
+        if row.idle == 0 {
+            self.truncated = true;
+            self.error = f64::INFINITY;
+        }
     }
 }

@@ -18,7 +18,10 @@ pub(super) struct Known {
     pub(super) felt: Vector6,
     /// How much nearer than its gap says the pair counts, m: its obstacle moves.
     pub(super) nearer: f64,
+    /// Updates since its last use.
     pub(super) idle: u32,
+    /// When it was of use last: larger is later.
+    pub(super) used: u64,
     /// Its pair faces no more: it slid past a reentrant edge, where the row is implied by those that are there.
     pub(super) implied: bool,
 }
@@ -64,8 +67,14 @@ impl Known {
             felt: felt(contact, surfaces, center),
             nearer: surfaces.nearer(contact),
             idle: 0,
+            used: 0,
             implied: false,
         }
+    }
+
+    pub(super) fn note_use(&mut self, now: u64) {
+        self.idle = 0;
+        self.used = now;
     }
 
     /// The Jacobian, and how much nearer the pair counts, m.
