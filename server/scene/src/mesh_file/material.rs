@@ -36,6 +36,17 @@ pub(crate) struct FileLook {
     pub(crate) lost: Vec<String>,
 }
 
+impl FileLook {
+    /// What of it nobody sees where a scene says `said` of the body; `None` if nothing. A scene that names a colour has said what it wants.
+    pub(crate) fn not_drawn(&self, said: &Appearance) -> Option<String> {
+        let unseen = said.opacity.is_none() && self.appearance.opacity == Some(0.0);
+        let unseen = unseen.then_some("all of the body: by its file it has the opacity 0");
+        let lost = self.lost.iter().filter(|_| said.color.is_none());
+        let all: Vec<&str> = unseen.into_iter().chain(lost.map(String::as_str)).collect();
+        (!all.is_empty()).then(|| all.join(", "))
+    }
+}
+
 impl Materials {
     /// The next `triangles` of the mesh are of this material.
     pub(super) fn push(&mut self, material: Option<usize>, triangles: usize) {

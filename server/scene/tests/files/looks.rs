@@ -229,6 +229,37 @@ fn the_material_of_an_obj_file_is_in_the_library_beside_it() {
 }
 
 #[test]
+fn a_part_whose_library_calls_opaque_transparent_is_seen() {
+    let folder = Folder::new();
+    let obj = |library: &str| {
+        folder.write("a.mtl", format!("newmtl m\n{library}\n"));
+        folder.write("a.obj", format!("mtllib a.mtl\nusemtl m\n{TETRAHEDRON}"));
+        folder.look("a.obj")
+    };
+    let (look, lost) = obj("Tr 1.000000");
+    assert_eq!(look.opacity, Some(1.0));
+    assert_eq!(
+        lost,
+        [
+            "of the look of \"a.obj\" is not drawn: `Tr` in line 2 of a.mtl, which is 1: some programs write that of opaque parts, and so it is taken"
+        ]
+    );
+    // What is meant to be invisible is, and says so, whatever colour the scene gives it.
+    let unseen = [
+        "of the look of \"a.obj\" is not drawn: all of the body: by its file it has the opacity 0",
+    ];
+    let (look, lost) = obj("d 0");
+    assert_eq!(
+        (look.opacity, lost),
+        (Some(0.0), unseen.map(str::to_owned).to_vec())
+    );
+    let shape = "shape = { mesh = \"a.obj\" }\ncolor = \"#000000\"";
+    assert_eq!(folder.built(shape, "").lost_looks, unseen);
+    let seen = folder.built(&format!("{shape}\nopacity = 1"), "");
+    assert_eq!(seen.lost_looks, [""; 0]);
+}
+
+#[test]
 fn an_import_writes_the_look_of_its_parts_into_the_scene() {
     let folder = Folder::new();
     folder.gltf("a.gltf", &format!("{RED},{RED}"), "");
