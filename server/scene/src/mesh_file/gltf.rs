@@ -79,6 +79,12 @@ fn parse_with(
                     of_node.index()
                 )));
             }
+            if node.skin().is_some() {
+                return Err(Fault::new(format!(
+                    "mesh {} has a skin, which is not applied; apply the armature, and export it again",
+                    of_node.index()
+                )));
+            }
             for primitive in of_node.primitives() {
                 let before = mesh.triangles.len();
                 append(
