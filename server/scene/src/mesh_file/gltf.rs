@@ -145,6 +145,7 @@ fn material(of: &gltf::Material<'_>) -> Material {
             || of.normal_texture().is_some()
             || of.occlusion_texture().is_some()
             || of.emissive_texture().is_some(),
+        is_defined: true,
     }
 }
 

@@ -6,6 +6,9 @@ use super::RawMesh;
 use super::mtl::read_library;
 use crate::appearance::Appearance;
 
+/// Most materials that nobody defines which are named.
+const MAX_UNDEFINED: usize = 3;
+
 /// A material of a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Material {
@@ -13,6 +16,8 @@ pub(super) struct Material {
     pub(super) appearance: Appearance,
     /// It names pictures.
     pub(super) textured: bool,
+    /// The file, or a library beside it, says what it looks like.
+    pub(super) is_defined: bool,
 }
 
 /// The materials of a file, and which triangles are of which.
@@ -59,12 +64,15 @@ impl Materials {
     /// Reads the libraries that lie in `directory`; then how the body looks.
     pub(super) fn look(mut self, mesh: &RawMesh, directory: Option<&Path>) -> FileLook {
         let mut lost = Vec::new();
+        let mut all_read = true;
         for library in std::mem::take(&mut self.libraries) {
             let inside = Path::new(&library)
                 .components()
                 .all(|part| matches!(part, Component::Normal(_)));
             let path = directory.filter(|_| inside).map(|d| d.join(&library));
-            match path.map(|path| read_library(&path, &mut self.list)) {
+            let read = path.map(|path| read_library(&path, &mut self.list));
+            all_read &= matches!(read, Some(Ok(_)));
+            match read {
                 Some(Ok(faults)) => lost.extend(faults),
                 Some(Err(problem)) => lost.push(format!("its materials: {problem}")),
                 None => lost.push(format!(
@@ -92,6 +100,15 @@ impl Materials {
                 material.name
             ));
         }
+        // A library that cannot be read is said above, and may define them.
+        let undefined = places.iter().filter_map(|place| self.list.get(*place));
+        let undefined = undefined.filter(|material| all_read && !material.is_defined);
+        lost.extend(undefined.take(MAX_UNDEFINED).map(|material| {
+            format!(
+                "its material \"{}\", which no library defines",
+                material.name
+            )
+        }));
         if places.iter().any(|place| of(*place).textured) {
             lost.push("its textures".to_owned());
         }
@@ -133,6 +150,7 @@ mod tests {
                 ..Appearance::default()
             },
             textured: false,
+            is_defined: true,
         }
     }
 

@@ -44,14 +44,19 @@ fn parse(text: &str, list: &mut [Material]) -> Vec<Remark> {
     let mut see_through = vec![SeeThrough::default(); list.len()];
     let mut current: Option<usize> = None;
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
-        let line = line.split('#').next().unwrap_or_default().trim();
+        let line = line.trim();
         let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         if key == "newmtl" {
+            // A name may hold a `#`, as `usemtl` has it.
             current = list
                 .iter()
                 .position(|material| material.name == rest.trim());
+            if let Some(place) = current {
+                list[place].is_defined = true;
+            }
             continue;
         }
+        let rest = rest.split('#').next().unwrap_or_default();
         let Some(place) = current else {
             continue;
         };
@@ -141,6 +146,17 @@ mod tests {
         assert!(list[0].textured && !list[1].textured);
         assert_eq!(list[1].appearance.opacity, Some(0.25));
         assert_eq!(list[1].appearance.color, Some([1.0; 3]));
+    }
+
+    #[test]
+    fn a_name_may_hold_the_sign_that_begins_comments() {
+        let mut list = [named("#c0c0c0"), named("Material #25"), named("Material")];
+        let text = "newmtl #c0c0c0\nKd 1 # white\n#Kd 0\nnewmtl Material #25\nd 0.5\n";
+        assert_eq!(parse(text, &mut list), []);
+        assert_eq!(list[0].appearance.color, Some([1.0; 3]));
+        assert_eq!(list[1].appearance.opacity, Some(0.5));
+        let defined = list.map(|material| material.is_defined);
+        assert_eq!(defined, [true, true, false]);
     }
 
     #[test]

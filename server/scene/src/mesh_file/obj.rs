@@ -28,9 +28,13 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
             .unwrap_or_default()
             .split_whitespace();
         match words.next() {
-            Some("v") => mesh
-                .vertices
-                .push(vertex(mesh.vertices.len(), words).map_err(|text| Fault::at(number, text))?),
+            Some("v") => {
+                // Red, green and blue behind the coordinates, as scanners write them.
+                materials.vertex_colours |= words.clone().nth(5).is_some();
+                mesh.vertices.push(
+                    vertex(mesh.vertices.len(), words).map_err(|text| Fault::at(number, text))?,
+                );
+            }
             Some("f") => {
                 let corners =
                     face(words, mesh.vertices.len()).map_err(|text| Fault::at(number, text))?;

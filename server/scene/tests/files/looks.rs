@@ -229,6 +229,34 @@ fn the_material_of_an_obj_file_is_in_the_library_beside_it() {
 }
 
 #[test]
+fn materials_that_nobody_defines_and_colours_of_vertices_are_named() {
+    let folder = Folder::new();
+    folder.write("a.mtl", "newmtl #c0c0c0\nKd 1 1 1\n");
+    let lost = |head: &str, body: &str| {
+        folder.write("a.obj", format!("{head}{body}"));
+        folder.look("a.obj")
+    };
+    let (look, said) = lost("mtllib a.mtl\nusemtl #c0c0c0\n", TETRAHEDRON);
+    assert_eq!((look.color, said), (Some([1.0; 3]), Vec::new()));
+    for head in ["mtllib a.mtl\nusemtl steel\n", "usemtl steel\n"] {
+        let (look, said) = lost(head, TETRAHEDRON);
+        assert_eq!(look, Appearance::default());
+        assert_eq!(
+            said,
+            [
+                "of the look of \"a.obj\" is not drawn: its material \"steel\", which no library defines"
+            ]
+        );
+    }
+    let coloured = TETRAHEDRON.replace("v 0.03 0 0\n", "v 0.03 0 0 1 0 0\n");
+    assert_ne!(coloured, TETRAHEDRON);
+    assert_eq!(
+        lost("", &coloured).1,
+        ["of the look of \"a.obj\" is not drawn: its colours of vertices"]
+    );
+}
+
+#[test]
 fn a_part_whose_library_calls_opaque_transparent_is_seen() {
     let folder = Folder::new();
     let obj = |library: &str| {
