@@ -58,7 +58,7 @@ pub struct ImportRequest {
     pub unit: Option<LengthUnit>,
     /// Most distance by which a simplified mesh may differ, m.
     pub simplify: Option<f64>,
-    /// Most edges of a hole that is closed; `None` closes small ones.
+    /// Most edges of a hole that is closed; `None` closes small ones, and with `thicken` none.
     pub close_holes: Option<usize>,
     /// Thickness of the solid that an open sheet becomes, m; `None` refuses sheets.
     pub thicken: Option<f64>,
