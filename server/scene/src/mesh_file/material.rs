@@ -1,9 +1,10 @@
 //! Materials of mesh files: which covers the most of a body, and what of the file's look is not drawn.
 
-use std::path::{Component, Path};
+use std::path::Path;
 
 use super::RawMesh;
 use super::mtl::read_library;
+use super::read::is_below;
 use crate::appearance::Appearance;
 
 /// Most materials that nobody defines which are named.
@@ -66,10 +67,8 @@ impl Materials {
         let mut lost = Vec::new();
         let mut all_read = true;
         for library in std::mem::take(&mut self.libraries) {
-            let inside = Path::new(&library)
-                .components()
-                .all(|part| matches!(part, Component::Normal(_)));
-            let path = directory.filter(|_| inside).map(|d| d.join(&library));
+            let inside = directory.filter(|_| is_below(Path::new(&library)));
+            let path = inside.map(|directory| directory.join(&library));
             let read = path.map(|path| read_library(&path, &mut self.list));
             all_read &= matches!(read, Some(Ok(_)));
             match read {

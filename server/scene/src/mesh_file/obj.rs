@@ -76,6 +76,16 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
     Ok(mesh)
 }
 
+/// The libraries of materials that the file names.
+pub(super) fn libraries(bytes: &[u8]) -> Vec<String> {
+    let text = String::from_utf8_lossy(without_mark(bytes));
+    let key = "mtllib";
+    lines(&text)
+        .filter(|(_, line)| line.split_whitespace().next() == Some(key))
+        .map(|(_, line)| named(&line, key).to_owned())
+        .collect()
+}
+
 /// The lines, counted from 1. One that ends in a backslash goes on in the next, and has the number of its first.
 fn lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     let mut lines = text.lines().enumerate();

@@ -378,3 +378,25 @@ fn the_files_of_a_scene_are_those_of_its_scenery_and_of_its_light_too() {
     let faults = format!("{:?}", scene.build().unwrap_err().problems());
     assert!(faults.contains("cannot be read as the light"), "{faults}");
 }
+
+#[test]
+fn the_files_of_a_scene_are_those_that_its_meshes_are_read_with_too() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.0.path().join("parts")).unwrap();
+    folder.gltf("Box.GLTF", &format!("{STEEL},{STEEL}"), "");
+    let libraries = "mtllib my lib.mtl\nmtllib none.mtl\nmtllib ../box.bin\n";
+    folder.write("parts/a.OBJ", format!("{libraries}{TETRAHEDRON}"));
+    folder.write("parts/my lib.mtl", "");
+    let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { mesh = \"parts/a.OBJ\" }\n\
+        [[scenery]]\nname = \"s\"\nshape = { mesh = \"Box.GLTF\" }\n";
+    let scene = Scene::parse("s.toml", text, folder.0.path()).unwrap();
+    let files = scene.files().unwrap();
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        names,
+        ["parts/a.OBJ", "parts/my lib.mtl", "Box.GLTF", "box.bin"]
+    );
+    for (name, found) in &files {
+        assert_eq!(*found, folder.0.path().join(name));
+    }
+}
