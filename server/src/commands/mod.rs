@@ -15,7 +15,6 @@ mod deploy;
 mod doctor;
 pub mod edit;
 mod export;
-mod finished_file;
 mod import;
 mod key;
 mod keys;

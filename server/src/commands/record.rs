@@ -13,9 +13,9 @@ use taut_link::{
     SupervisedLink,
 };
 use taut_proto::SceneDescription;
+use taut_scene::FinishedFile;
 
 use crate::cli::RecordArgs;
-use crate::commands::finished_file::FinishedFile;
 use crate::commands::key;
 use crate::commands::signals::EndSignal;
 use crate::shared::failure::Failure;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Writes beside `path` under a name of its own, and takes the name when it is finished. Dropped before, it leaves nothing. What is there and is no
 /// file, such as `/dev/null` or a pipe, is written to as it is: nobody wants it replaced.
 #[derive(Debug)]
-pub(super) struct FinishedFile {
+pub struct FinishedFile {
     path: PathBuf,
     /// None where `path` is written to as it is.
     partial: Option<PathBuf>,
@@ -16,7 +16,7 @@ pub(super) struct FinishedFile {
 
 impl FinishedFile {
     /// Begins the file; the directory must be there. It is none of the `inputs`, nor in a folder that is one: they would be lost.
-    pub(super) fn create(path: &Path, inputs: &[&Path]) -> io::Result<Self> {
+    pub fn create(path: &Path, inputs: &[&Path]) -> io::Result<Self> {
         if path == Path::new("-") {
             let why = "`-` is no file here: the answer is renamed when it is whole, which standard output cannot be; name a file, such as ./answer";
             return Err(io::Error::new(io::ErrorKind::InvalidFilename, why));
@@ -47,7 +47,7 @@ impl FinishedFile {
     }
 
     /// Gives the whole file its name.
-    pub(super) fn finish(mut self) -> io::Result<()> {
+    pub fn finish(mut self) -> io::Result<()> {
         let written = self.writer.take().map(BufWriter::into_inner).transpose();
         let written = written.map_err(io::IntoInnerError::into_error)?;
         let (Some(file), Some(partial)) = (written, &self.partial) else {
@@ -55,6 +55,18 @@ impl FinishedFile {
         };
         file.sync_all()?;
         fs::rename(partial, &self.path)
+    }
+
+    /// Puts a text in the place of what a file holds, with its permissions; whoever reads it finds the one or the other. A link stays one.
+    pub fn replace(path: &Path, text: &str) -> io::Result<()> {
+        let path = fs::canonicalize(path)?;
+        let permissions = fs::metadata(&path)?.permissions();
+        let mut file = Self::create(&path, &[])?;
+        file.write_all(text.as_bytes())?;
+        if let Some(partial) = &file.partial {
+            fs::set_permissions(partial, permissions)?;
+        }
+        file.finish()
     }
 }
 
@@ -73,18 +85,6 @@ fn is_in(path: &Path, input: &Path) -> bool {
     };
     let place = fs::canonicalize(path).or_else(|_| parent());
     place.is_ok_and(|place| place.starts_with(input))
-}
-
-/// Puts a text in the place of what a file holds, with its permissions; whoever reads it finds the one or the other. A link stays one.
-pub(super) fn replace(path: &Path, text: &str) -> io::Result<()> {
-    let path = fs::canonicalize(path)?;
-    let permissions = fs::metadata(&path)?.permissions();
-    let mut file = FinishedFile::create(&path, &[])?;
-    file.write_all(text.as_bytes())?;
-    if let Some(partial) = &file.partial {
-        fs::set_permissions(partial, permissions)?;
-    }
-    file.finish()
 }
 
 impl Write for FinishedFile {
@@ -164,13 +164,13 @@ mod tests {
         let directory = tempfile::tempdir().expect("no temporary directory");
         let [path, link] = ["scene.toml", "link.toml"].map(|name| directory.path().join(name));
         assert!(
-            replace(&path, "new").is_err(),
+            FinishedFile::replace(&path, "new").is_err(),
             "there is nothing to replace"
         );
         assert!(fs::write(&path, "old").is_ok());
         assert!(fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).is_ok());
         assert!(std::os::unix::fs::symlink(&path, &link).is_ok());
-        assert!(replace(&link, "new").is_ok());
+        assert!(FinishedFile::replace(&link, "new").is_ok());
         assert!(fs::read(&path).is_ok_and(|bytes| bytes == b"new"));
         assert!(fs::symlink_metadata(&link).is_ok_and(|link| link.is_symlink()));
         let mode = fs::metadata(&path).map(|about| about.permissions().mode() & 0o777);
