@@ -1,5 +1,6 @@
 //! A file that appears under its name only when it is whole.
 
+use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -12,6 +13,10 @@ pub struct FinishedFile {
     /// None where `path` is written to as it is.
     partial: Option<PathBuf>,
     writer: Option<BufWriter<File>>,
+    /// A file that is there is not replaced.
+    is_new: bool,
+    /// Dropped before it is finished, it stays under the name that it has.
+    is_kept: bool,
 }
 
 impl FinishedFile {
@@ -31,19 +36,44 @@ impl FinishedFile {
                 path: path.to_path_buf(),
                 partial: None,
                 writer: Some(BufWriter::new(File::options().write(true).open(path)?)),
+                is_new: false,
+                is_kept: false,
             });
         }
         let name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
-        let mut partial_name = std::ffi::OsString::from(".");
+        let mut partial_name = OsString::from(".");
         partial_name.push(name);
         partial_name.push(format!(".{}.partial", std::process::id()));
-        let partial = path.with_file_name(partial_name);
-        let writer = Some(BufWriter::new(File::create(&partial)?));
+        // A process of this number may have left its own there.
+        let partial = free_name(&path.with_file_name(partial_name));
+        let writer = Some(BufWriter::new(File::create_new(&partial)?));
         Ok(Self {
             path: path.to_path_buf(),
             partial: Some(partial),
             writer,
+            is_new: false,
+            is_kept: false,
         })
+    }
+
+    /// The same for what cannot be made again: a file that is there already is not replaced, neither now nor when this one is finished.
+    pub fn create_new(path: &Path, inputs: &[&Path]) -> io::Result<Self> {
+        if is_taken(path) {
+            return Err(taken());
+        }
+        let mut file = Self::create(path, inputs)?;
+        file.is_new = true;
+        Ok(file)
+    }
+
+    /// From now on what was written stays, whatever happens.
+    pub fn keep(&mut self) {
+        self.is_kept = true;
+    }
+
+    /// Where what was written stays if the file is not finished; `None` if nothing does.
+    pub fn kept(&self) -> Option<&Path> {
+        self.partial.as_deref().filter(|_| self.is_kept)
     }
 
     /// Gives the whole file its name.
@@ -54,6 +84,9 @@ impl FinishedFile {
             return Ok(());
         };
         file.sync_all()?;
+        if self.is_new && is_taken(&self.path) {
+            return Err(taken());
+        }
         fs::rename(partial, &self.path)
     }
 
@@ -68,6 +101,36 @@ impl FinishedFile {
         }
         file.finish()
     }
+}
+
+/// Whether a file of this name would replace one, or a folder. What is no file, such as `/dev/null` or a pipe, is written to as it is.
+pub fn is_taken(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|about| about.is_file() || about.is_dir())
+}
+
+/// `path`, or where it is taken the first of `NAME-2.ENDING`, `NAME-3.ENDING`, ... that is not.
+pub fn free_name(path: &Path) -> PathBuf {
+    let numbered = |number: u64| {
+        let mut name = path.file_stem().unwrap_or_default().to_os_string();
+        name.push(format!("-{number}"));
+        if let Some(ending) = path.extension() {
+            name.push(".");
+            name.push(ending);
+        }
+        path.with_file_name(name)
+    };
+    let mut number = 1;
+    let mut free = path.to_path_buf();
+    while is_taken(&free) {
+        number += 1;
+        free = numbered(number);
+    }
+    free
+}
+
+fn taken() -> io::Error {
+    let why = "it is there already, and is not written over; name another file";
+    io::Error::new(io::ErrorKind::AlreadyExists, why)
 }
 
 /// `path` leads to `input`, or into it where that is a folder.
@@ -103,7 +166,7 @@ impl Write for FinishedFile {
 impl Drop for FinishedFile {
     fn drop(&mut self) {
         // Finished, there is nothing to remove; otherwise a failure to remove has nobody left to be told to.
-        if let Some(partial) = &self.partial {
+        if let Some(partial) = self.partial.as_ref().filter(|_| !self.is_kept) {
             let _ = fs::remove_file(partial);
         }
     }
@@ -176,6 +239,54 @@ mod tests {
         let mode = fs::metadata(&path).map(|about| about.permissions().mode() & 0o777);
         assert_eq!(mode.ok(), Some(0o640));
         assert_eq!(fs::read_dir(directory.path()).map_or(0, Iterator::count), 2);
+    }
+
+    #[test]
+    fn what_cannot_be_made_again_replaces_nothing_and_is_kept() {
+        let directory = tempfile::tempdir().expect("no temporary directory");
+        let path = directory.path().join("hand.csv");
+        let create = || FinishedFile::create_new(&path, &[]);
+        let kind = |made: io::Result<()>| made.map_err(|error| error.kind());
+
+        // Nothing is kept of what was begun and has nothing in it yet.
+        drop(create());
+        assert_eq!(fs::read_dir(directory.path()).map_or(1, Iterator::count), 0);
+        let mut first = create().expect("cannot write");
+        first.keep();
+        let kept = first.kept().expect("it is kept").to_path_buf();
+        assert!(first.write_all(b"first").is_ok());
+        drop(first);
+        assert!(fs::read(&kept).is_ok_and(|bytes| bytes == b"first"));
+
+        // One of the same process is beside it.
+        let mut second = create().expect("cannot write");
+        second.keep();
+        assert_ne!(second.kept(), Some(kept.as_path()));
+        let kept = second.kept().expect("it is kept").to_path_buf();
+        assert!(second.write_all(b"second").is_ok());
+        assert!(fs::write(&path, "precious").is_ok());
+        assert_eq!(kind(second.finish()), Err(io::ErrorKind::AlreadyExists));
+        assert_eq!(kind(create().map(drop)), Err(io::ErrorKind::AlreadyExists));
+        assert!(fs::read(&path).is_ok_and(|bytes| bytes == b"precious"));
+        assert!(fs::read(&kept).is_ok_and(|bytes| bytes == b"second"));
+    }
+
+    #[test]
+    fn names_are_numbered_where_they_are_taken() {
+        let directory = tempfile::tempdir().expect("no temporary directory");
+        let path = |name: &str| directory.path().join(name);
+        for (name, free) in [
+            ("a.b.rrd", "a.b.rrd"),
+            ("a.b.rrd", "a.b-2.rrd"),
+            ("a.b.rrd", "a.b-3.rrd"),
+            ("bare", "bare"),
+            ("bare", "bare-2"),
+        ] {
+            assert_eq!(free_name(&path(name)), path(free));
+            assert!(fs::write(path(free), "").is_ok());
+        }
+        #[cfg(unix)]
+        assert_eq!(free_name(Path::new("/dev/null")), Path::new("/dev/null"));
     }
 
     #[test]

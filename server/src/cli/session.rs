@@ -122,9 +122,12 @@ pub struct RecordArgs {
     /// The haptic PC
     #[arg(long, value_name = "H:P")]
     pub server: String,
-    /// Where the trace goes, a CSV file
+    /// Where the trace goes, a new CSV file
     #[arg(long, value_name = "T", value_parser = output())]
     pub out: PathBuf,
+    /// Where that file is there already, write T-2, T-3, ... beside it
+    #[arg(long)]
+    pub number: bool,
     /// An observer's or operator's credential, or the cluster key; else TAUT_KEY_FILE names it
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
