@@ -32,7 +32,7 @@ pub struct DemoArgs {
     /// Put the device in a process of its own
     #[arg(long)]
     pub bridge: bool,
-    /// Also write what the monitor shows to this file
+    /// Also write what the monitor shows to this new file
     #[arg(long, value_name = "FILE.rrd")]
     pub record: Option<PathBuf>,
     /// Record the session into this new directory, to be computed again by `taut replay --recording`
@@ -87,7 +87,7 @@ pub struct ServeArgs {
     /// End after this many seconds (default: at Ctrl-C)
     #[arg(long, value_name = "S", value_parser = positive_seconds)]
     pub duration: Option<f64>,
-    /// Also write what the monitor shows to this file
+    /// Also write what the monitor shows to this new file
     #[arg(long, value_name = "FILE.rrd")]
     pub record: Option<PathBuf>,
     /// Record the session into this new directory, to be computed again by `taut replay --recording`
