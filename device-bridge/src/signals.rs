@@ -110,7 +110,8 @@ fn signals() -> Vec<i32> {
 
 /// Whether whoever started this process had the signal ignored. On Linux; elsewhere none is.
 #[cfg(unix)]
-fn is_ignored(signal: i32) -> bool {
+#[must_use]
+pub fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status
         .lines()

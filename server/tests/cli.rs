@@ -209,8 +209,8 @@ fn a_session_is_served_recorded_and_ended_by_a_signal() {
             .status
             .success()
     );
-    let out = place.text("trace.csv");
-    let record = |key: &str| {
+    let [out, refused_out] = ["trace.csv", "refused.csv"].map(|name| place.text(name));
+    let record = |key: &str, out: &str| {
         [
             "record",
             "--server",
@@ -218,7 +218,7 @@ fn a_session_is_served_recorded_and_ended_by_a_signal() {
             "--key",
             key,
             "--out",
-            &out,
+            out,
             "--duration",
             "1",
         ]
@@ -226,7 +226,7 @@ fn a_session_is_served_recorded_and_ended_by_a_signal() {
     };
     let begun = Instant::now();
     let recorded = loop {
-        let output = taut(&record(&place.text("cluster.key")));
+        let output = taut(&record(&place.text("cluster.key"), &out));
         if output.status.success() || begun.elapsed() > PATIENCE {
             break output;
         }
@@ -236,7 +236,7 @@ fn a_session_is_served_recorded_and_ended_by_a_signal() {
         "{}",
         String::from_utf8_lossy(&recorded.stderr)
     );
-    refused(&record(&place.text("other.key")), &["key"]);
+    refused(&record(&place.text("other.key"), &refused_out), &["key"]);
 
     let checked = taut(&["check", &out]);
     assert!(

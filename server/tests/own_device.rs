@@ -92,7 +92,7 @@ fn what_cannot_be_is_refused_by_name() {
         "{said}"
     );
 
-    // Each session would write over the one before.
+    // A recording is of one session.
     let record = with_device("kind = \"remote\"")
         .replace("[monitoring]", "[monitoring]\nrecord = \"all.rrd\"");
     assert!(record.contains("all.rrd"));

@@ -2,8 +2,11 @@
 
 use std::net::UdpSocket;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
-use crate::support::{PATIENCE, Running, Workplace, wait_until};
+use taut_bridge::signals::is_ignored;
+
+use crate::support::{PATIENCE, Running, Workplace, taut, wait_until};
 
 /// Times of the rows of a trace, s.
 fn times(trace: &Path) -> Vec<f64> {
@@ -88,4 +91,74 @@ fn a_recording_ends_with_the_server_that_stops_unless_told_to_stay() {
     assert!(staying.runs(), "it was told to stay");
     assert!(staying.end("-TERM").status.success());
     assert!(times(&place.path("staying.csv")).len() > 100);
+}
+
+#[test]
+fn a_trace_that_is_there_is_not_written_over() {
+    let place = Workplace::new();
+    let free = UdpSocket::bind(("127.0.0.1", 0))
+        .and_then(|socket| socket.local_addr())
+        .expect("no port");
+    let (address, key) = (free.to_string(), place.text("cluster.key"));
+    let out = place.text("trace.csv");
+    place.write("trace.csv", "precious");
+    let record = ["record", "--server", &address, "--key", &key, "--out", &out];
+    let record = [&record[..], &["--stay"]].concat();
+    // Nobody is there, and nobody is waited for.
+    let refused = taut(&record);
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(said.contains("trace.csv is there already"), "{said}");
+
+    let _server = Running::start(&place.serve("workbench.toml", "120", &["--quic", &address]));
+    let numbered = [&record[..], &["--number"]].concat();
+    let brief = taut(&[&numbered[..], &["--duration", "0.1"]].concat());
+    assert!(brief.status.success(), "{brief:?}");
+    let said = String::from_utf8_lossy(&brief.stdout);
+    assert!(said.contains("trace-2.csv: "), "{said}");
+    assert!(times(&place.path("trace-2.csv")).len() > 1);
+
+    // A terminal that is gone ends it as Ctrl-C does.
+    let recorder = Running::start(&numbered);
+    let partial = place.path(&format!(".trace-3.csv.{}.partial", recorder.id()));
+    wait_until("no rows", || {
+        std::fs::metadata(&partial).is_ok_and(|file| file.len() > 0)
+    });
+    let signal = if is_ignored(libc::SIGHUP) {
+        "-INT"
+    } else {
+        "-HUP"
+    };
+    assert!(recorder.end(signal).status.success());
+    assert!(times(&place.path("trace-3.csv")).len() > 1);
+    assert!(std::fs::read(&out).is_ok_and(|bytes| bytes == b"precious"));
+}
+
+/// As on a full disk: no file of the recorder may be larger than some kilobytes.
+#[test]
+fn what_was_recorded_until_the_disk_was_full_is_kept_and_named() {
+    let place = Workplace::new();
+    let free = UdpSocket::bind(("127.0.0.1", 0))
+        .and_then(|socket| socket.local_addr())
+        .expect("no port");
+    let (address, key) = (free.to_string(), place.text("cluster.key"));
+    let _server = Running::start(&place.serve("workbench.toml", "120", &["--quic", &address]));
+    let script = "trap '' XFSZ; ulimit -f 16; exec \"$0\" \"$@\"";
+    let out = place.text("trace.csv");
+    let recorder = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_taut"), "record", "--stay"])
+        .args(["--server", &address, "--key", &key, "--out", &out])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("a shell");
+    let partial = place.path(&format!(".trace.csv.{}.partial", recorder.id()));
+    let ended = recorder.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(2), "{said}");
+    let named = format!("what could be is in {}", partial.display());
+    assert!(said.contains(&named), "{said}");
+    assert!(times(&partial).len() > 10, "{said}");
+    assert!(!place.path("trace.csv").exists());
 }

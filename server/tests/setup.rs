@@ -163,3 +163,15 @@ fn wrong_answers_without_end_long_ones_and_a_place_that_cannot_be_written_leave_
         "{error}"
     );
 }
+
+#[test]
+fn a_folder_that_is_missing_is_told_before_a_question_is_asked() {
+    let place = Workplace::new();
+    let out = place.text("nowhere/mine.toml");
+    let output = taut(&["setup", "--out", &out]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("nowhere is no folder"), "{said}");
+    assert!(output.stdout.is_empty(), "{output:?}");
+    assert!(!said.contains("name of the workbench"), "{said}");
+}

@@ -79,6 +79,39 @@ fn a_recorded_session_is_read_back_with_its_entities_and_its_whole_time() {
     );
 }
 
+#[test]
+fn a_recording_that_is_there_is_refused_or_the_next_is_beside_it() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.set("scene", "sphere-on-plane");
+    let path = workbench.write("session.rrd", "precious");
+    let record = path.display().to_string();
+    let config = workbench.save().display().to_string();
+    let key = workbench.key_path();
+    let always = ["serve", "--config", &config, "--key", &key];
+    let refused = workbench.run("refused", &[&always[..], &["--record", &record]].concat());
+    assert_eq!(refused.status.code(), Some(2), "{}", refused.stderr);
+    let sentence = refused.one_sentence();
+    assert!(
+        sentence.contains("session.rrd is there already"),
+        "{sentence}"
+    );
+
+    // A service that is started again has nobody to name another file.
+    workbench.set("monitoring.enabled", true);
+    workbench.set("monitoring.record", record);
+    for number in [2, 3] {
+        let mut server = workbench.serve(&[]);
+        let said = server
+            .process
+            .line_after("what it shows is written to ", START_LIMIT);
+        let name = format!("session-{number}.rrd");
+        assert!(said.ends_with(&name), "{said}");
+        server.stop();
+        inspect(&workbench.directory().join(name)).unwrap_or_else(|error| panic!("{error}"));
+    }
+    assert_eq!(std::fs::read(path).expect("there"), b"precious");
+}
+
 /// A device that pushes and cannot turn: whoever looks on is told, and sees what the hand feels.
 #[test]
 fn a_device_without_torque_is_said_in_the_picture_and_its_torque_is_none() {

@@ -1,6 +1,7 @@
 //! The monitor: a thread that owns rerun.
 
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -80,17 +81,7 @@ impl Monitor {
             served = Some(server);
         }
         if let Some(path) = &options.record {
-            // Without its footer a recording needs no memory that grows with its length; it opens just as well.
-            let file = FileSink::with_options(
-                path,
-                FileSinkOptions {
-                    write_footer: false,
-                },
-            );
-            sinks.push(Box::new(file.map_err(|error| MonitorError::Record {
-                path: path.clone(),
-                reason: error.to_string(),
-            })?));
+            sinks.push(Box::new(file_sink(path)?));
         }
 
         let rerun_refused = |error: rerun::RecordingStreamError| MonitorError::Rerun {
@@ -136,6 +127,12 @@ impl Monitor {
     #[must_use]
     pub fn stream_address(&self) -> Option<&str> {
         self.stream.as_deref()
+    }
+
+    /// The file to which everything is written, too.
+    #[must_use]
+    pub fn recording(&self) -> Option<&Path> {
+        self.recording.as_deref()
     }
 
     /// Shows a line at the newest session time; never waits.
@@ -211,6 +208,24 @@ impl Served {
         };
         Ok((served, hosted))
     }
+}
+
+/// Into a new file. What is no file, such as a pipe, is opened as it is.
+fn file_sink(path: &Path) -> Result<FileSink, MonitorError> {
+    let refused = |reason: String| MonitorError::Record {
+        path: path.to_path_buf(),
+        reason,
+    };
+    let is_special = |about: fs::Metadata| !about.is_file() && !about.is_dir();
+    if !fs::metadata(path).is_ok_and(is_special) {
+        // Made here, because rerun empties what it opens: it would empty a recording that is there.
+        fs::File::create_new(path).map_err(|error| refused(error.to_string()))?;
+    }
+    // Without its footer a recording needs no memory that grows with its length; it opens just as well.
+    let options = FileSinkOptions {
+        write_footer: false,
+    };
+    FileSink::with_options(path, options).map_err(|error| refused(error.to_string()))
 }
 
 /// A stream into all `sinks`; into nothing without any.

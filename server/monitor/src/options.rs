@@ -19,7 +19,7 @@ pub struct MonitorOptions {
     pub grpc_port: u16,
     /// TCP port of the web page; 0 takes a free one.
     pub web_port: u16,
-    /// Also write everything to this `.rrd` file.
+    /// Also write everything to this new `.rrd` file; one that is there is not written over.
     pub record: Option<PathBuf>,
     /// Most bytes of history kept for late observers, beside the scene; the oldest goes first.
     pub memory_limit_bytes: u64,

@@ -224,6 +224,17 @@ fn a_recording_that_cannot_be_written_is_an_error_that_names_the_file() {
 }
 
 #[test]
+fn a_recording_that_is_there_is_not_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.rrd");
+    std::fs::write(&path, "precious").unwrap();
+    let error = Monitor::start(&recording_only(&path), scene()).unwrap_err();
+    assert!(matches!(error, MonitorError::Record { .. }));
+    assert!(error.to_string().contains("session.rrd"), "{error}");
+    assert_eq!(std::fs::read(&path).unwrap(), b"precious");
+}
+
+#[test]
 fn a_full_disk_is_an_error_that_names_the_file() {
     let full = std::path::Path::new("/dev/full"); // Linux: every write fails as on a full disk.
     if !full.exists() {

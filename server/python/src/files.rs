@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use taut_scene::{DeviceTrace, REPLAY_COLUMNS, ReplayWriter, Runner, Scene, numbers_of_pose};
+use taut_scene::{
+    DeviceTrace, FinishedFile, REPLAY_COLUMNS, ReplayWriter, Runner, Scene, numbers_of_pose,
+};
 
 use crate::convert::{bad, bad_file, table};
 
@@ -80,18 +82,30 @@ pub(crate) fn replay<'py>(
     table(py, numbers, REPLAY_COLUMNS.split(',').count())
 }
 
-/// All columns of all rows; the file, if one is named, gets the bytes that `taut replay` writes.
+/// All columns of all rows; the file, if one is named, gets the bytes that `taut replay` writes, and is neither the scene nor the trace.
 fn rows(scene: &str, trace: &Path, out: Option<&Path>) -> PyResult<Vec<f64>> {
+    let inputs = [Path::new(scene), trace];
     let built = Scene::named_or_file(scene)
         .and_then(|scene| scene.build())
         .map_err(bad_file)?;
     let trace = DeviceTrace::load(trace).map_err(bad_file)?;
     let mut runner = Runner::of_scene(built).map_err(|error| bad(error.to_string()))?;
-    let mut writer = ReplayWriter::new(Vec::new(), false)?;
+    let cannot_write = |error: std::io::Error| {
+        bad(format!(
+            "{}: the answer cannot be written ({error}); check the path, its permissions and the free space",
+            out.unwrap_or(Path::new("")).display()
+        ))
+    };
+    let mut writer = out
+        .map(|out| ReplayWriter::new(FinishedFile::create(out, &inputs)?, false))
+        .transpose()
+        .map_err(cannot_write)?;
     let mut numbers = Vec::new();
     for sample in trace.samples() {
         let row = runner.row(sample.time, &sample.pose, &mut ());
-        writer.write(&row)?;
+        if let Some(writer) = &mut writer {
+            writer.write(&row).map_err(cannot_write)?;
+        }
         numbers.push(row.time);
         numbers.extend(numbers_of_pose(&row.device_pose));
         numbers.extend(numbers_of_pose(&row.god_object_pose));
@@ -99,8 +113,11 @@ fn rows(scene: &str, trace: &Path, out: Option<&Path>) -> PyResult<Vec<f64>> {
         numbers.extend([row.contacts as f64, row.active as f64]);
         numbers.extend([row.gap_min, row.kkt, row.stale]);
     }
-    if let Some(out) = out {
-        std::fs::write(out, writer.finish()?)?;
+    if let Some(writer) = writer {
+        writer
+            .finish()
+            .and_then(FinishedFile::finish)
+            .map_err(cannot_write)?;
     }
     Ok(numbers)
 }

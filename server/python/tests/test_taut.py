@@ -66,6 +66,20 @@ class Replay(unittest.TestCase):
                 self.assertGreater(np.linalg.norm(force, axis=1).max(), 0.1, "the trace touches something")
                 self.assertEqual(rows.shape, (expected.count(b"\n") - 1, len(taut.COLUMNS)))
 
+    def test_an_answer_is_not_written_over_what_it_is_made_of(self):
+        with tempfile.TemporaryDirectory() as name:
+            trace, link = pathlib.Path(name) / "trace.csv", pathlib.Path(name) / "link.csv"
+            dense_trace("sphere-on-plane", trace)
+            link.symlink_to(trace)
+            before = trace.read_bytes()
+            for out in (trace, link):
+                with self.assertRaisesRegex(taut.TautError, "it is read for this answer"):
+                    taut.replay("sphere-on-plane", trace, out)
+            with self.assertRaisesRegex(taut.TautError, "cannot be written"):
+                taut.replay("sphere-on-plane", trace, pathlib.Path(name) / "nowhere" / "answer.csv")
+            self.assertEqual(trace.read_bytes(), before)
+            self.assertEqual(len(list(pathlib.Path(name).iterdir())), 2)
+
     def test_the_notebook_runs(self):
         with tempfile.TemporaryDirectory() as name:
             trace = pathlib.Path(name) / "trace.csv"

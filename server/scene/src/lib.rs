@@ -10,6 +10,7 @@ mod document;
 mod environment_file;
 pub mod fidelity;
 mod files;
+mod finished_file;
 mod height_map_file;
 mod import;
 mod mesh_file;
@@ -30,6 +31,7 @@ pub use document::Document;
 pub use environment_file::read_environment;
 pub use fidelity::FidelityPlan;
 pub use files::{DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, data_dir, data_dirs, data_file};
+pub use finished_file::{FinishedFile, free_name, is_taken};
 pub use import::{
     Finding, ImportReport, ImportRequest, LengthUnit, MAX_HOLE_EDGES, PartReport, import,
     import_unless,

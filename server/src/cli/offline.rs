@@ -116,7 +116,7 @@ pub struct ImportArgs {
     /// Use as few triangles as keep within this distance of the part
     #[arg(long, value_name = "METRES", value_parser = positive_length)]
     pub simplify: Option<f64>,
-    /// Close holes of at most this many edges (default: 16, if a hole is below 1 % of its surface)
+    /// Close holes of at most this many edges (default: 16, if a hole is below 1 % of its surface; none with --thicken)
     #[arg(long, value_name = "EDGES", value_parser = hole_edges)]
     pub close_holes: Option<usize>,
     /// Make open sheets solids of this thickness (default: sheets are refused)

@@ -32,7 +32,7 @@ pub struct DemoArgs {
     /// Put the device in a process of its own
     #[arg(long)]
     pub bridge: bool,
-    /// Also write what the monitor shows to this file
+    /// Also write what the monitor shows to this new file
     #[arg(long, value_name = "FILE.rrd")]
     pub record: Option<PathBuf>,
     /// Record the session into this new directory, to be computed again by `taut replay --recording`
@@ -87,7 +87,7 @@ pub struct ServeArgs {
     /// End after this many seconds (default: at Ctrl-C)
     #[arg(long, value_name = "S", value_parser = positive_seconds)]
     pub duration: Option<f64>,
-    /// Also write what the monitor shows to this file
+    /// Also write what the monitor shows to this new file
     #[arg(long, value_name = "FILE.rrd")]
     pub record: Option<PathBuf>,
     /// Record the session into this new directory, to be computed again by `taut replay --recording`
@@ -122,9 +122,12 @@ pub struct RecordArgs {
     /// The haptic PC
     #[arg(long, value_name = "H:P")]
     pub server: String,
-    /// Where the trace goes, a CSV file
+    /// Where the trace goes, a new CSV file
     #[arg(long, value_name = "T", value_parser = output())]
     pub out: PathBuf,
+    /// Where that file is there already, write T-2, T-3, ... beside it
+    #[arg(long)]
+    pub number: bool,
     /// An observer's or operator's credential, or the cluster key; else TAUT_KEY_FILE names it
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,

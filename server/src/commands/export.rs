@@ -3,10 +3,9 @@
 use taut_recording::{
     ExportReport, MovingObstacle, Recording, RecordingError, SceneFrames, export_mcap,
 };
-use taut_scene::BuiltScene;
+use taut_scene::{BuiltScene, FinishedFile};
 
 use crate::cli::ExportArgs;
-use crate::commands::finished_file::FinishedFile;
 use crate::commands::replay::recorded::scene_of;
 use crate::shared::failure::Failure;
 use crate::shared::shutdown::Shutdown;

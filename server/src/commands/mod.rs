@@ -15,7 +15,6 @@ mod deploy;
 mod doctor;
 pub mod edit;
 mod export;
-mod finished_file;
 mod import;
 mod key;
 mod keys;
@@ -194,8 +193,8 @@ fn recorded_command(directory: &Path, args: &ReplayArgs) -> Result<ExitCode> {
 
 fn record_command(args: &RecordArgs) -> Result<ExitCode> {
     let runtime = network(2)?;
-    let rows = runtime.block_on(record::run(args))?;
-    print(format!("{}: {rows} samples", args.out.display()))?;
+    let (out, rows) = runtime.block_on(record::run(args))?;
+    print(format!("{}: {rows} samples", out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -9,10 +9,9 @@ use nalgebra::UnitQuaternion;
 use taut_render::RenderError;
 use taut_render::preview::{Preview, PreviewScene};
 use taut_render::renderer::{Gpu, GpuChoice};
-use taut_scene::{BuiltScene, Scene};
+use taut_scene::{BuiltScene, FinishedFile, Scene};
 
 use crate::cli::{PREVIEW_SIZE, PreviewArgs};
-use crate::commands::finished_file::FinishedFile;
 use crate::session::setup::content::bodies;
 use crate::shared::failure::{EXIT_BAD_INPUT, Failure};
 

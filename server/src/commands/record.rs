@@ -4,6 +4,7 @@
 
 use std::future::ready;
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -13,9 +14,9 @@ use taut_link::{
     SupervisedLink,
 };
 use taut_proto::SceneDescription;
+use taut_scene::{FinishedFile, free_name, is_taken};
 
 use crate::cli::RecordArgs;
-use crate::commands::finished_file::FinishedFile;
 use crate::commands::key;
 use crate::commands::signals::EndSignal;
 use crate::shared::failure::Failure;
@@ -27,15 +28,16 @@ const DEAD_AFTER: Duration = Duration::from_secs(2);
 /// Least time between the last sample of one session and the first of the next.
 const SESSIONS_APART_S: f64 = 1e-3;
 
-/// Records until the duration is over, the user ends it, or the server stops; a server that is lost is joined again. How many rows there are.
-pub(super) async fn run(args: &RecordArgs) -> Result<u64, Failure> {
+/// Records until the duration is over, the user ends it, or the server stops; a server that is lost is joined again. The file, and how many rows
+/// there are in it.
+pub(super) async fn run(args: &RecordArgs) -> Result<(PathBuf, u64), Failure> {
     let key = key::read_to_join(args.key.as_deref())?;
-    let cannot_write = |error: std::io::Error| {
-        Failure::BadInput(format!(
-            "{}: the trace cannot be written ({error}); check the path, its permissions and the free space",
-            args.out.display()
-        ))
-    };
+    let out = place(args)?;
+    let cannot_write = |error: std::io::Error| not_written(&out, &error, None);
+    let inputs: Vec<&Path> = args.key.as_deref().into_iter().collect();
+    // Before anybody is waited for: what cannot be written is told at once.
+    let file = FinishedFile::create_new(&out, &inputs).map_err(cannot_write)?;
+    let trace = TraceWriter::begin(file).map_err(cannot_write)?;
     let mut signal = EndSignal::listen().map_err(Failure::failed)?;
     let any_name = || format!("record-{}", std::process::id());
     let node = key.node_name().map_or_else(any_name, str::to_owned);
@@ -63,10 +65,8 @@ pub(super) async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         ))),
     };
     let (supervised, link, ()) = joined;
-    let inputs: Vec<&std::path::Path> = args.key.as_deref().into_iter().collect();
     let mut recorder = Recorder {
-        trace: TraceWriter::begin(FinishedFile::create(&args.out, &inputs).map_err(cannot_write)?)
-            .map_err(cannot_write)?,
+        trace,
         scene: link.description().clone(),
         link,
         lost: 0,
@@ -79,14 +79,15 @@ pub(super) async fn run(args: &RecordArgs) -> Result<u64, Failure> {
     drop(supervised);
     let lost = recorder.lost + recorder.link.counters().lost;
     recorder.link.leave().await;
-    recorded.map_err(cannot_write)?;
-
     let trace = recorder.trace;
+    let kept = trace.file.kept().map(Path::to_path_buf);
+    let cannot_write = |error: std::io::Error| not_written(&out, &error, kept.as_deref());
+    recorded.map_err(cannot_write)?;
     if trace.rows == 0 {
         return Err(Failure::Failed(format!(
             "no device sample came from {}, so {} was not written; check that the device runs",
             args.server,
-            args.out.display()
+            out.display()
         )));
     }
     if lost > 0 {
@@ -96,7 +97,39 @@ pub(super) async fn run(args: &RecordArgs) -> Result<u64, Failure> {
     }
     let rows = trace.rows;
     trace.file.finish().map_err(cannot_write)?;
-    Ok(rows)
+    Ok((out, rows))
+}
+
+/// Where the trace goes: a recording cannot be made again, so none is written over.
+fn place(args: &RecordArgs) -> Result<PathBuf, Failure> {
+    let out = args.out.display();
+    if !is_taken(&args.out) {
+        return Ok(args.out.clone());
+    }
+    if !args.number {
+        return Err(Failure::BadInput(format!(
+            "{out} is there already and is not written over; give another --out, or --number"
+        )));
+    }
+    let free = free_name(&args.out);
+    taut_log::say(&format!(
+        "taut: {out} is there already; the trace goes to {}",
+        free.display()
+    ));
+    Ok(free)
+}
+
+fn not_written(out: &Path, error: &std::io::Error, kept: Option<&Path>) -> Failure {
+    let out = out.display();
+    Failure::BadInput(match kept {
+        Some(kept) => format!(
+            "{out}: the trace cannot be written ({error}); what could be is in {}",
+            kept.display()
+        ),
+        None => format!(
+            "{out}: the trace cannot be written ({error}); check the path, its permissions and the free space"
+        ),
+    })
 }
 
 /// A recording under way.
@@ -232,6 +265,7 @@ impl TraceWriter {
         )?;
         self.last_time_s = time_s;
         self.rows += 1;
+        self.file.keep();
         Ok(())
     }
 }

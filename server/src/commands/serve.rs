@@ -173,6 +173,9 @@ pub(super) fn announce(session: &Session, terminal: &Terminal) {
         if let Some(stream) = monitor.stream_address() {
             terminal.say(&format!("or in the rerun viewer: rerun {stream}"));
         }
+        if let Some(file) = monitor.recording() {
+            terminal.say(&format!("what it shows is written to {}", file.display()));
+        }
     }
     for line in session.fidelity().into_iter().flat_map(FidelityPlan::lines) {
         terminal.say(&line);

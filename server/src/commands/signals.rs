@@ -1,5 +1,5 @@
-//! The user's wish to end, for a task that waits for it: Ctrl-C, or the system's SIGTERM. What holds a force looks at a flag instead,
-//! [`taut_bridge::signals`].
+//! The user's wish to end, for a task that waits for it: Ctrl-C, a terminal that is gone, or the system's SIGTERM. What holds a force looks at a
+//! flag instead, [`taut_bridge::signals`].
 
 /// Listens from its creation on: a signal before [`EndSignal::given`] is awaited is not lost.
 #[derive(Debug)]
@@ -8,6 +8,9 @@ pub(super) struct EndSignal {
     terminate: tokio::signal::unix::Signal,
     #[cfg(unix)]
     interrupt: tokio::signal::unix::Signal,
+    /// None where it was ignored at the start, as by `nohup`.
+    #[cfg(unix)]
+    hangup: Option<tokio::signal::unix::Signal>,
 }
 
 impl EndSignal {
@@ -16,9 +19,12 @@ impl EndSignal {
         #[cfg(unix)]
         {
             use tokio::signal::unix::{SignalKind, signal};
+            let hangup = SignalKind::hangup();
+            let is_ignored = taut_bridge::signals::is_ignored(hangup.as_raw_value());
             Ok(Self {
                 terminate: signal(SignalKind::terminate())?,
                 interrupt: signal(SignalKind::interrupt())?,
+                hangup: (!is_ignored).then(|| signal(hangup)).transpose()?,
             })
         }
         #[cfg(not(unix))]
@@ -28,9 +34,23 @@ impl EndSignal {
     /// Returns when the end is asked for.
     pub(super) async fn given(&mut self) {
         #[cfg(unix)]
-        tokio::select! {
-            _ = self.terminate.recv() => {}
-            _ = self.interrupt.recv() => {}
+        {
+            let Self {
+                terminate,
+                interrupt,
+                hangup,
+            } = self;
+            let hangup = async {
+                match hangup {
+                    Some(signal) => signal.recv().await,
+                    None => std::future::pending().await,
+                }
+            };
+            tokio::select! {
+                _ = terminate.recv() => {}
+                _ = interrupt.recv() => {}
+                _ = hangup => {}
+            }
         }
         #[cfg(not(unix))]
         if tokio::signal::ctrl_c().await.is_err() {

@@ -301,3 +301,38 @@ fn files_of_screens_go_to_the_machine_that_draws_them_beside_its_credential() {
         assert_eq!(there, has, "{machine}");
     }
 }
+
+#[test]
+fn what_meshes_are_read_with_is_in_the_archive_beside_them() {
+    let place = prepared();
+    let scenery = [("part", "part.obj"), ("plate", "Plate.GLTF")].map(|(name, file)| {
+        format!("[[scenery]]\nname = \"{name}\"\nshape = {{ mesh = \"parts/{file}\" }}\n")
+    });
+    let scene = include_str!("../../scenes/sphere-on-plane.toml").to_owned() + &scenery.concat();
+    place.write("scenes/mine.toml", &scene);
+    fs::create_dir(place.path("scenes/parts")).expect("a folder");
+    let part = "mtllib part.mtl\nusemtl red\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n";
+    place.write("scenes/parts/part.obj", part);
+    place.write("scenes/parts/part.mtl", "newmtl red\nKd 1 0 0\n");
+    let triangle = [0.0_f32, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.1, 0.0];
+    let bytes = triangle.map(f32::to_le_bytes).concat();
+    fs::write(place.path("scenes/parts/plate.bin"), bytes).expect("written");
+    let plate = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"buffers":[{"uri":"plate.bin","byteLength":36}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[0.1,0.1,0]}]}"#;
+    place.write("scenes/parts/Plate.GLTF", plate);
+    let (code, said) = deploy(&place, &[]);
+    assert_eq!(code, Some(0), "{said}");
+    let etc = unpacked(&place, "haptic-pc").join("etc");
+    for file in ["part.obj", "part.mtl", "Plate.GLTF", "plate.bin"] {
+        assert!(etc.join("scenes/parts").join(file).is_file(), "{file}");
+    }
+    // There, too, all of the look is found.
+    let checked = taut(&["check", &etc.join("scenes/mine.toml").display().to_string()]);
+    let said = String::from_utf8_lossy(&checked.stdout);
+    assert!(
+        checked.status.success() && !said.contains("not drawn"),
+        "{said}"
+    );
+}

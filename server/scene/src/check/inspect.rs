@@ -5,6 +5,7 @@ use std::path::Path;
 use god_object::Mesh;
 
 use super::report::{FileKind, FileReport, MeshFigures};
+use crate::appearance::Appearance;
 use crate::document::{Document, Value};
 use crate::fidelity::FidelityPlan;
 use crate::files::{MAX_TOML_BYTES, read_text};
@@ -94,12 +95,8 @@ fn check_mesh(path: &Path) -> FileReport {
     let longest = figures.size_m.iter().copied().fold(0.0, f64::max);
     let mut notes = Vec::new();
     notes.extend(doubt_about_size("the mesh", longest));
-    if !look.lost.is_empty() {
-        notes.push(format!(
-            "of its look is not drawn: {}",
-            look.lost.join(", ")
-        ));
-    }
+    let lost = look.not_drawn(&Appearance::default());
+    notes.extend(lost.map(|lost| format!("of its look is not drawn: {lost}")));
     let summary = figures.to_string();
     FileReport {
         file: path.display().to_string(),

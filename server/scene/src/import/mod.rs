@@ -27,6 +27,7 @@ pub use holes::MAX_HOLE_EDGES;
 pub use report::{Finding, ImportReport, PartReport};
 pub use unit::LengthUnit;
 
+use crate::appearance::Appearance;
 use crate::check::{MeshFigures, place_text};
 use crate::mesh_file::{RawMesh, read_mesh_and_look, write_ply};
 use crate::problem::{FileError, Problem};
@@ -57,7 +58,7 @@ pub struct ImportRequest {
     pub unit: Option<LengthUnit>,
     /// Most distance by which a simplified mesh may differ, m.
     pub simplify: Option<f64>,
-    /// Most edges of a hole that is closed; `None` closes small ones.
+    /// Most edges of a hole that is closed; `None` closes small ones, and with `thicken` none.
     pub close_holes: Option<usize>,
     /// Thickness of the solid that an open sheet becomes, m; `None` refuses sheets.
     pub thicken: Option<f64>,
@@ -235,8 +236,8 @@ fn part(
             "NOT MENDED: the surface touches or runs through itself; its mass counts what overlaps twice, and the force inside is not defined",
         ));
     }
-    if !look.lost.is_empty() {
-        let text = format!("of its look is not drawn: {}", look.lost.join(", "));
+    if let Some(lost) = look.not_drawn(&Appearance::default()) {
+        let text = format!("of its look is not drawn: {lost}");
         let finding = Finding::new("look-lost", &Places::default(), text);
         report.findings.push(finding);
     }

@@ -172,7 +172,9 @@ fn close(
     wishes: Wishes,
     findings: &mut Vec<Finding>,
 ) -> Result<Option<f64>, Vec<String>> {
-    let closed = holes::close(mesh, wishes.close_holes);
+    // Small openings of a sheet are meant, as those for bolts: they stay, unless it is asked for.
+    let most_edges = wishes.close_holes.or(wishes.thicken.map(|_| 0));
+    let closed = holes::close(mesh, most_edges);
     note(findings, "holes-closed", &closed.holes, |n| {
         format!(
             "closed {n} holes with {} triangles, the longest {:.3e} m around",

@@ -12,7 +12,7 @@ use nalgebra::{Matrix4, Point3};
 use percent_encoding::percent_decode_str;
 
 use super::material::{Material, Materials};
-use super::read::finite_vertex;
+use super::read::{finite_vertex, is_below};
 use super::{Fault, RawMesh};
 use crate::appearance::Appearance;
 use crate::files::{MAX_MESH_BYTES, read_bytes};
@@ -79,6 +79,12 @@ fn parse_with(
                     of_node.index()
                 )));
             }
+            if node.skin().is_some() {
+                return Err(Fault::new(format!(
+                    "mesh {} has a skin, which is not applied; apply the armature, and export it again",
+                    of_node.index()
+                )));
+            }
             for primitive in of_node.primitives() {
                 let before = mesh.triangles.len();
                 append(
@@ -139,6 +145,7 @@ fn material(of: &gltf::Material<'_>) -> Material {
             || of.normal_texture().is_some()
             || of.occlusion_texture().is_some()
             || of.emissive_texture().is_some(),
+        is_defined: true,
     }
 }
 
@@ -205,23 +212,18 @@ fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, 
                 .blob
                 .clone()
                 .ok_or_else(|| Fault::new("has no binary part; export it again as .glb"))?,
-            Source::Uri(uri) => match uri.split_once(";base64,") {
-                Some((_, data)) if uri.starts_with("data:") => {
-                    decode_base64(data).ok_or_else(|| {
-                        Fault::new(format!(
-                            "buffer {number} is no valid base64; export it again"
-                        ))
-                    })?
-                }
-                _ => {
+            Source::Uri(uri) => match embedded(uri) {
+                Some(data) => decode_base64(data).ok_or_else(|| {
+                    Fault::new(format!(
+                        "buffer {number} is no valid base64; export it again"
+                    ))
+                })?,
+                None => {
                     let decoded = percent_decode_str(uri).decode_utf8().map_err(|_| {
                         Fault::new(format!("buffer {number} is `{uri}`, which is no text when its %.. are decoded; export it as .glb"))
                     })?;
                     let named = Path::new(&*decoded);
-                    let inside = named
-                        .components()
-                        .all(|c| matches!(c, std::path::Component::Normal(_)));
-                    let directory = directory.filter(|_| inside).ok_or_else(|| {
+                    let directory = directory.filter(|_| is_below(named)).ok_or_else(|| {
                         Fault::new(format!("buffer {number} is `{uri}`, but must lie beside the file; export it as .glb"))
                     })?;
                     read_bytes(&directory.join(named), MAX_MESH_BYTES).map_err(|problem| {
@@ -241,6 +243,27 @@ fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, 
         all.push(bytes);
     }
     Ok(all)
+}
+
+/// The base64 of a buffer that is within the file.
+fn embedded(uri: &str) -> Option<&str> {
+    let (_, data) = uri.strip_prefix("data:")?.split_once(";base64,")?;
+    Some(data)
+}
+
+/// Names of the files that hold the buffers; none of a file that is no glTF.
+pub(super) fn buffer_files(bytes: &[u8]) -> Vec<String> {
+    let named = |buffer: gltf::Buffer<'_>| match buffer.source() {
+        Source::Uri(uri) if embedded(uri).is_none() => {
+            let decoded = percent_decode_str(uri).decode_utf8().ok()?;
+            Some(decoded.into_owned())
+        }
+        _ => None,
+    };
+    validated(bytes).map_or_else(
+        |_| Vec::new(),
+        |file| file.buffers().filter_map(named).collect(),
+    )
 }
 
 /// Positions are three floats for a vertex, indices unsigned integers, and both lie within their buffers.

@@ -171,6 +171,19 @@ fn morph_targets_are_refused_where_they_have_weights() {
 }
 
 #[test]
+fn a_mesh_with_a_skin_is_refused() {
+    // A skin of its own makes a file no worse; a mesh that hangs on one is elsewhere than its vertices say.
+    let with_skin = |node: &str| {
+        triangle(node, 2).replace("\"meshes\":", "\"skins\":[{\"joints\":[0]}],\"meshes\":")
+    };
+    assert!(parse(with_skin("").as_bytes(), None).is_ok());
+    let text = parse(with_skin(r#","skin":0"#).as_bytes(), None)
+        .unwrap_err()
+        .text;
+    assert!(text.starts_with("mesh 0 has a skin"), "{text}");
+}
+
+#[test]
 fn an_accessor_past_its_buffer_is_refused() {
     let text = triangle("", 2).replace(r#""count":3,"type":"VEC3""#, r#""count":4,"type":"VEC3""#);
     let text = parse(text.as_bytes(), None).unwrap_err().text;

@@ -1,10 +1,14 @@
 //! Materials of mesh files: which covers the most of a body, and what of the file's look is not drawn.
 
-use std::path::{Component, Path};
+use std::path::Path;
 
 use super::RawMesh;
 use super::mtl::read_library;
+use super::read::is_below;
 use crate::appearance::Appearance;
+
+/// Most materials that nobody defines which are named.
+const MAX_UNDEFINED: usize = 3;
 
 /// A material of a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -13,6 +17,8 @@ pub(super) struct Material {
     pub(super) appearance: Appearance,
     /// It names pictures.
     pub(super) textured: bool,
+    /// The file, or a library beside it, says what it looks like.
+    pub(super) is_defined: bool,
 }
 
 /// The materials of a file, and which triangles are of which.
@@ -36,6 +42,17 @@ pub(crate) struct FileLook {
     pub(crate) lost: Vec<String>,
 }
 
+impl FileLook {
+    /// What of it nobody sees where a scene says `said` of the body; `None` if nothing. A scene that names a colour has said what it wants.
+    pub(crate) fn not_drawn(&self, said: &Appearance) -> Option<String> {
+        let unseen = said.opacity.is_none() && self.appearance.opacity == Some(0.0);
+        let unseen = unseen.then_some("all of the body: by its file it has the opacity 0");
+        let lost = self.lost.iter().filter(|_| said.color.is_none());
+        let all: Vec<&str> = unseen.into_iter().chain(lost.map(String::as_str)).collect();
+        (!all.is_empty()).then(|| all.join(", "))
+    }
+}
+
 impl Materials {
     /// The next `triangles` of the mesh are of this material.
     pub(super) fn push(&mut self, material: Option<usize>, triangles: usize) {
@@ -48,12 +65,13 @@ impl Materials {
     /// Reads the libraries that lie in `directory`; then how the body looks.
     pub(super) fn look(mut self, mesh: &RawMesh, directory: Option<&Path>) -> FileLook {
         let mut lost = Vec::new();
+        let mut all_read = true;
         for library in std::mem::take(&mut self.libraries) {
-            let inside = Path::new(&library)
-                .components()
-                .all(|part| matches!(part, Component::Normal(_)));
-            let path = directory.filter(|_| inside).map(|d| d.join(&library));
-            match path.map(|path| read_library(&path, &mut self.list)) {
+            let inside = directory.filter(|_| is_below(Path::new(&library)));
+            let path = inside.map(|directory| directory.join(&library));
+            let read = path.map(|path| read_library(&path, &mut self.list));
+            all_read &= matches!(read, Some(Ok(_)));
+            match read {
                 Some(Ok(faults)) => lost.extend(faults),
                 Some(Err(problem)) => lost.push(format!("its materials: {problem}")),
                 None => lost.push(format!(
@@ -81,6 +99,15 @@ impl Materials {
                 material.name
             ));
         }
+        // A library that cannot be read is said above, and may define them.
+        let undefined = places.iter().filter_map(|place| self.list.get(*place));
+        let undefined = undefined.filter(|material| all_read && !material.is_defined);
+        lost.extend(undefined.take(MAX_UNDEFINED).map(|material| {
+            format!(
+                "its material \"{}\", which no library defines",
+                material.name
+            )
+        }));
         if places.iter().any(|place| of(*place).textured) {
             lost.push("its textures".to_owned());
         }
@@ -122,6 +149,7 @@ mod tests {
                 ..Appearance::default()
             },
             textured: false,
+            is_defined: true,
         }
     }
 

@@ -15,6 +15,6 @@ pub(crate) use material::FileLook;
 pub use ply::write_ply;
 pub use raw_mesh::RawMesh;
 use read::Fault;
-pub(crate) use read::{is_gltf_path, read_mesh_and_look};
+pub(crate) use read::{files_beside, is_gltf_path, read_mesh_and_look};
 pub use read::{is_mesh_path, read_mesh, read_mesh_bytes};
 pub(crate) use texture_coordinates::read_texture_coordinates;

@@ -4,7 +4,7 @@
 //! |--------------|-----------------------------------------------|
 //! | `newmtl`     | the name of the material whose keys follow    |
 //! | `Kd`         | diffuse colour, sRGB as CAD programs write it |
-//! | `d`, `Tr`    | opacity, or one less it                       |
+//! | `d`, `Tr`    | opacity, or one less it; `d` counts before    |
 //! | `Pr`, `Pm`   | roughness and metalness (PBR extension)       |
 //! | `map_...`    | a picture; not drawn                          |
 
@@ -20,42 +20,81 @@ use crate::problem::Problem;
 const MAX_BYTES: u64 = 16 << 20;
 /// Most lines that are complained of.
 const MAX_FAULTS: usize = 3;
+/// What is said of a key of ours without its numbers.
+const NO_NUMBERS: &str = "which has no usable numbers";
+/// What is said of a `Tr` of 1 that stands alone: by the key's meaning the body would not be seen.
+const OPAQUE: &str = "which is 1: some programs write that of opaque parts, and so it is taken";
 
-/// Says of the named materials of `list` what the file says; lines that are not understood are named.
+/// Line, key and what is to be said of it.
+type Remark = (usize, String, &'static str);
+
+/// Says of the named materials of `list` what the file says; lines that are not understood, or not taken at their word, are named.
 pub(super) fn read_library(path: &Path, list: &mut [Material]) -> Result<Vec<String>, Problem> {
     let bytes = read_bytes(path, MAX_BYTES)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let faults = parse(&String::from_utf8_lossy(without_mark(&bytes)), list);
     let named = faults.into_iter().take(MAX_FAULTS);
     Ok(named
-        .map(|(line, key)| format!("`{key}` in line {line} of {file}, which has no usable numbers"))
+        .map(|(line, key, why)| format!("`{key}` in line {line} of {file}, {why}"))
         .collect())
 }
 
-fn parse(text: &str, list: &mut [Material]) -> Vec<(usize, String)> {
+fn parse(text: &str, list: &mut [Material]) -> Vec<Remark> {
     let mut faults = Vec::new();
+    let mut see_through = vec![SeeThrough::default(); list.len()];
     let mut current: Option<usize> = None;
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
-        let line = line.split('#').next().unwrap_or_default().trim();
+        let line = line.trim();
         let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         if key == "newmtl" {
+            // A name may hold a `#`, as `usemtl` has it.
             current = list
                 .iter()
                 .position(|material| material.name == rest.trim());
+            if let Some(place) = current {
+                list[place].is_defined = true;
+            }
             continue;
         }
-        let Some(material) = current.and_then(|place| list.get_mut(place)) else {
+        let rest = rest.split('#').next().unwrap_or_default();
+        let Some(place) = current else {
             continue;
         };
-        if !take(key, rest, material) {
-            faults.push((number, key.to_owned()));
+        if !take(key, rest, number, &mut list[place], &mut see_through[place]) {
+            faults.push((number, key.to_owned(), NO_NUMBERS));
         }
+    }
+    for (material, said) in list.iter_mut().zip(&see_through) {
+        material.appearance.opacity = match (said.dissolve, said.transparency) {
+            (Some(opacity), _) => Some(opacity),
+            (None, Some((line, 1.0))) => {
+                faults.push((line, "Tr".to_owned(), OPAQUE));
+                Some(1.0)
+            }
+            (None, Some((_, transparency))) => Some(1.0 - transparency),
+            (None, None) => material.appearance.opacity,
+        };
     }
     faults
 }
 
+/// What a library says of how far one sees through a material.
+#[derive(Clone, Copy, Debug, Default)]
+struct SeeThrough {
+    /// Of `d`: the opacity.
+    dissolve: Option<f32>,
+    /// Line and value of `Tr`: one less the opacity.
+    transparency: Option<(usize, f32)>,
+}
+
 /// `false` where the key is one of ours and its numbers are none.
-fn take(key: &str, rest: &str, material: &mut Material) -> bool {
+fn take(
+    key: &str,
+    rest: &str,
+    line: usize,
+    material: &mut Material,
+    see_through: &mut SeeThrough,
+) -> bool {
     let numbers: Vec<f64> = rest
         .split_whitespace()
         .map_while(|word| word.parse().ok().filter(|value: &f64| value.is_finite()))
@@ -65,7 +104,7 @@ fn take(key: &str, rest: &str, material: &mut Material) -> bool {
         color,
         roughness,
         metallic,
-        opacity,
+        ..
     } = &mut material.appearance;
     match (key, numbers.as_slice()) {
         ("Kd", &[red, green, blue, ..]) => {
@@ -73,8 +112,8 @@ fn take(key: &str, rest: &str, material: &mut Material) -> bool {
         }
         // One number is a grey.
         ("Kd", &[grey]) => *color = Some([linear(grey) as f32; 3]),
-        ("d", &[value, ..]) => *opacity = Some(value as f32),
-        ("Tr", &[value, ..]) => *opacity = Some(1.0 - value as f32),
+        ("d", &[value, ..]) => see_through.dissolve = Some(value as f32),
+        ("Tr", &[value, ..]) => see_through.transparency = Some((line, value as f32)),
         ("Pr", &[value, ..]) => *roughness = Some(value as f32),
         ("Pm", &[value, ..]) => *metallic = Some(value as f32),
         ("Kd" | "d" | "Tr" | "Pr" | "Pm", _) => return false,
@@ -110,11 +149,40 @@ mod tests {
     }
 
     #[test]
+    fn a_name_may_hold_the_sign_that_begins_comments() {
+        let mut list = [named("#c0c0c0"), named("Material #25"), named("Material")];
+        let text = "newmtl #c0c0c0\nKd 1 # white\n#Kd 0\nnewmtl Material #25\nd 0.5\n";
+        assert_eq!(parse(text, &mut list), []);
+        assert_eq!(list[0].appearance.color, Some([1.0; 3]));
+        assert_eq!(list[1].appearance.opacity, Some(0.5));
+        let defined = list.map(|material| material.is_defined);
+        assert_eq!(defined, [true, true, false]);
+    }
+
+    #[test]
+    fn a_lone_transparency_of_one_is_opaque_and_dissolve_counts_before_it() {
+        for (keys, opacity, line) in [
+            ("Tr 1.000000", 1.0, Some(2)),
+            ("Tr 0", 1.0, None),
+            ("Tr 0.75", 0.25, None),
+            ("d 0.5\nTr 1", 0.5, None),
+            ("Tr 0.25\nd 1", 1.0, None),
+            ("d 0", 0.0, None),
+        ] {
+            let mut list = [named("m")];
+            let said = parse(&format!("newmtl m\n{keys}\n"), &mut list);
+            assert_eq!(list[0].appearance.opacity, Some(opacity), "{keys}");
+            let said: Vec<usize> = said.iter().map(|(line, ..)| *line).collect();
+            assert_eq!(said, Vec::from_iter(line), "{keys}");
+        }
+    }
+
+    #[test]
     fn lines_without_their_numbers_are_named() {
         let mut list = [named("m")];
         let text = "newmtl m\nKd spectral a.rfl\nd nan\nKd 1 0\nNs many\n";
         let faults = parse(text, &mut list);
-        let lines: Vec<usize> = faults.iter().map(|(line, _)| *line).collect();
+        let lines: Vec<usize> = faults.iter().map(|(line, ..)| *line).collect();
         assert_eq!(lines, [2, 3, 4]);
         assert_eq!(list[0].appearance, Appearance::default());
     }

@@ -1,5 +1,6 @@
 //! Wavefront OBJ: `v` and `f` lines, in double precision, with line numbers; `usemtl` and `mtllib`; `vt` lines where they are asked for.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use god_object::surface::CornerCoordinates;
@@ -21,16 +22,20 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
     let mut material = None;
     // Faces may name vertices that come later: remember the line, check at the end.
     let mut first_line_of_largest = (0u32, 0usize);
-    for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
+    for (number, line) in lines(&text) {
         let mut words = line
             .split('#')
             .next()
             .unwrap_or_default()
             .split_whitespace();
         match words.next() {
-            Some("v") => mesh
-                .vertices
-                .push(vertex(mesh.vertices.len(), words).map_err(|text| Fault::at(number, text))?),
+            Some("v") => {
+                // Red, green and blue behind the coordinates, as scanners write them.
+                materials.vertex_colours |= words.clone().nth(5).is_some();
+                mesh.vertices.push(
+                    vertex(mesh.vertices.len(), words).map_err(|text| Fault::at(number, text))?,
+                );
+            }
             Some("f") => {
                 let corners =
                     face(words, mesh.vertices.len()).map_err(|text| Fault::at(number, text))?;
@@ -44,7 +49,7 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
             }
             // Names may hold blanks.
             Some(key @ "usemtl") => {
-                let name = named(line, key);
+                let name = named(&line, key);
                 let place = places.entry(name.to_owned()).or_insert_with(|| {
                     materials.list.push(Material {
                         name: name.to_owned(),
@@ -54,7 +59,7 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
                 });
                 material = Some(*place);
             }
-            Some(key @ "mtllib") => materials.libraries.push(named(line, key).to_owned()),
+            Some(key @ "mtllib") => materials.libraries.push(named(&line, key).to_owned()),
             _ => {}
         }
     }
@@ -71,6 +76,43 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
     Ok(mesh)
 }
 
+/// The libraries of materials that the file names.
+pub(super) fn libraries(bytes: &[u8]) -> Vec<String> {
+    let text = String::from_utf8_lossy(without_mark(bytes));
+    let key = "mtllib";
+    lines(&text)
+        .filter(|(_, line)| line.split_whitespace().next() == Some(key))
+        .map(|(_, line)| named(&line, key).to_owned())
+        .collect()
+}
+
+/// The lines, counted from 1. One that ends in a backslash goes on in the next, and has the number of its first.
+fn lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
+    let mut lines = text.lines().enumerate();
+    std::iter::from_fn(move || {
+        let (index, line) = lines.next()?;
+        let Some(begun) = continued(line) else {
+            return Some((index + 1, Cow::Borrowed(line)));
+        };
+        let mut whole = begun.to_owned();
+        for (_, line) in lines.by_ref() {
+            whole.push(' ');
+            let more = continued(line);
+            whole.push_str(more.unwrap_or(line));
+            if more.is_none() {
+                break;
+            }
+        }
+        Some((index + 1, Cow::Owned(whole)))
+    })
+}
+
+/// What a line has before the backslash at its end; `None` without one. At the end of a comment it is the end of a folder's name.
+fn continued(line: &str) -> Option<&str> {
+    let begun = line.trim_end().strip_suffix('\\')?;
+    (!begun.contains('#')).then_some(begun)
+}
+
 /// What follows the key of a line.
 fn named<'l>(line: &'l str, key: &str) -> &'l str {
     line.trim_start().trim_start_matches(key).trim()
@@ -83,7 +125,7 @@ pub(super) fn parse_texture_coordinates(bytes: &[u8]) -> Result<Vec<CornerCoordi
     let mut pairs: Vec<[f64; 2]> = Vec::new();
     // Faces may name vertices and pairs that come later.
     let mut faces: Vec<(usize, Vec<u32>, Vec<u32>)> = Vec::new();
-    for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
+    for (number, line) in lines(&text) {
         let mut words = line
             .split('#')
             .next()
@@ -224,6 +266,20 @@ mod tests {
             parse(b"# square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1e-9\nf 1/1/1 2//2 3 -1\n").unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices[3].z, 1e-9);
+    }
+
+    #[test]
+    fn a_line_that_ends_in_a_backslash_goes_on_in_the_next() {
+        let text = "# C:\\parts\\\nv 0 0 0\nv 1 \\\r\n0 0\nv 0 1 0\nvt 0 0\nf 1/1 \\\n2/1 \\\n3/1\nf 1/1 2/1 \\";
+        let fault = parse(text.as_bytes()).unwrap_err();
+        assert_eq!(
+            fault,
+            Fault::at(10, "a face has 2 corners, but needs three; repair the line")
+        );
+        let whole = text.trim_end_matches("f 1/1 2/1 \\");
+        assert_eq!(parse(whole.as_bytes()).unwrap().triangles, [[0, 1, 2]]);
+        let coordinates = parse_texture_coordinates(whole.as_bytes()).unwrap();
+        assert_eq!(coordinates, [[[0.0, 1.0]; 3]]);
     }
 
     #[test]

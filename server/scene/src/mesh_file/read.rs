@@ -1,6 +1,6 @@
 //! Reading a mesh file of any known format.
 
-use std::path::Path;
+use std::path::{Component, Path};
 
 use super::material::{FileLook, Materials};
 use super::{RawMesh, gltf, obj, ply, stl};
@@ -76,6 +76,27 @@ pub(crate) fn read_mesh_and_look(path: &Path) -> Result<(RawMesh, FileLook), Fil
     let (mesh, materials) = parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path))?;
     let look = materials.look(&mesh, path.parent());
     Ok((mesh, look))
+}
+
+/// Names of the files that this mesh file is read with, relative to its folder, where they are there: libraries of materials, buffers.
+/// None of a mesh that cannot be read: whoever reads it is told why.
+pub(crate) fn files_beside(path: &Path) -> Vec<String> {
+    let named: fn(&[u8]) -> Vec<String> = match extension(path).as_str() {
+        "obj" => obj::libraries,
+        "glb" | "gltf" => gltf::buffer_files,
+        _ => return Vec::new(),
+    };
+    let names = mesh_bytes(path).map_or_else(|_| Vec::new(), |bytes| named(&bytes));
+    names
+        .into_iter()
+        .filter(|name| is_below(Path::new(name)) && path.with_file_name(name).is_file())
+        .collect()
+}
+
+/// Whether a file of this name lies in the folder from which it is named, or below it.
+pub(super) fn is_below(name: &Path) -> bool {
+    let mut parts = name.components();
+    parts.all(|part| matches!(part, Component::Normal(_)))
 }
 
 fn mesh_bytes(path: &Path) -> Result<Vec<u8>, Problem> {

@@ -495,12 +495,11 @@ fn simplify_as_asked(
     Some(report)
 }
 
-/// What the file of a shape says of its look and nobody draws; a scene that names a colour has said what it wants.
+/// What the file of a shape says of its look and nobody sees.
 fn lost_look(shape: &Shape, said: &Appearance, look: &FileLook) -> Option<String> {
     let file = shape.file()?;
-    let lost = look.lost.join(", ");
-    let wanted = said.color.is_none() && !lost.is_empty();
-    wanted.then(|| format!("of the look of \"{file}\" is not drawn: {lost}"))
+    let lost = look.not_drawn(said)?;
+    Some(format!("of the look of \"{file}\" is not drawn: {lost}"))
 }
 
 fn drawn(name: &str, mesh: &Mesh, pose: Pose, appearance: Appearance) -> BuiltBody {

@@ -1,9 +1,10 @@
 //! The files that a server reads beside its workbench file: what must be copied with it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::load::Workbench;
 use super::spec::Device;
+use crate::mesh_file::files_beside;
 use crate::problem::FileError;
 use crate::scene::{Scene, shipped_scene_text};
 
@@ -90,14 +91,22 @@ impl Workbench {
 }
 
 impl Scene {
-    /// The files that the scene names and that are not part of the program: each name once, and where it is.
+    /// The files that the scene names and that are not part of the program, and those that its meshes are read with: each name once, and where it is.
     pub fn files(&self) -> Result<Vec<(String, PathBuf)>, FileError> {
         let mut files: Vec<(String, PathBuf)> = Vec::new();
         for (name, at) in self.file_names() {
             if self.is_in_program(name) || files.iter().any(|(known, _)| known == name) {
                 continue;
             }
-            files.push((name.to_owned(), self.locate(name, at)?));
+            let found = self.locate(name, at)?;
+            files.push((name.to_owned(), found.clone()));
+            for beside in files_beside(&found) {
+                let name = Path::new(name).with_file_name(&beside);
+                let name = name.to_string_lossy().into_owned();
+                if files.iter().all(|(known, _)| *known != name) {
+                    files.push((name, found.with_file_name(&beside)));
+                }
+            }
         }
         Ok(files)
     }

@@ -199,7 +199,7 @@ pub struct Monitoring {
     pub grpc_port: u16,
     /// TCP port of the web viewer; 0 takes a free one.
     pub web_port: u16,
-    /// Also write an .rrd file here.
+    /// Also write an .rrd file here, or under the next free name: none is written over.
     pub record: Option<PathBuf>,
     /// Most memory that the hosted stream keeps, bytes.
     pub memory_limit: u64,

@@ -229,6 +229,65 @@ fn the_material_of_an_obj_file_is_in_the_library_beside_it() {
 }
 
 #[test]
+fn materials_that_nobody_defines_and_colours_of_vertices_are_named() {
+    let folder = Folder::new();
+    folder.write("a.mtl", "newmtl #c0c0c0\nKd 1 1 1\n");
+    let lost = |head: &str, body: &str| {
+        folder.write("a.obj", format!("{head}{body}"));
+        folder.look("a.obj")
+    };
+    let (look, said) = lost("mtllib a.mtl\nusemtl #c0c0c0\n", TETRAHEDRON);
+    assert_eq!((look.color, said), (Some([1.0; 3]), Vec::new()));
+    for head in ["mtllib a.mtl\nusemtl steel\n", "usemtl steel\n"] {
+        let (look, said) = lost(head, TETRAHEDRON);
+        assert_eq!(look, Appearance::default());
+        assert_eq!(
+            said,
+            [
+                "of the look of \"a.obj\" is not drawn: its material \"steel\", which no library defines"
+            ]
+        );
+    }
+    let coloured = TETRAHEDRON.replace("v 0.03 0 0\n", "v 0.03 0 0 1 0 0\n");
+    assert_ne!(coloured, TETRAHEDRON);
+    assert_eq!(
+        lost("", &coloured).1,
+        ["of the look of \"a.obj\" is not drawn: its colours of vertices"]
+    );
+}
+
+#[test]
+fn a_part_whose_library_calls_opaque_transparent_is_seen() {
+    let folder = Folder::new();
+    let obj = |library: &str| {
+        folder.write("a.mtl", format!("newmtl m\n{library}\n"));
+        folder.write("a.obj", format!("mtllib a.mtl\nusemtl m\n{TETRAHEDRON}"));
+        folder.look("a.obj")
+    };
+    let (look, lost) = obj("Tr 1.000000");
+    assert_eq!(look.opacity, Some(1.0));
+    assert_eq!(
+        lost,
+        [
+            "of the look of \"a.obj\" is not drawn: `Tr` in line 2 of a.mtl, which is 1: some programs write that of opaque parts, and so it is taken"
+        ]
+    );
+    // What is meant to be invisible is, and says so, whatever colour the scene gives it.
+    let unseen = [
+        "of the look of \"a.obj\" is not drawn: all of the body: by its file it has the opacity 0",
+    ];
+    let (look, lost) = obj("d 0");
+    assert_eq!(
+        (look.opacity, lost),
+        (Some(0.0), unseen.map(str::to_owned).to_vec())
+    );
+    let shape = "shape = { mesh = \"a.obj\" }\ncolor = \"#000000\"";
+    assert_eq!(folder.built(shape, "").lost_looks, unseen);
+    let seen = folder.built(&format!("{shape}\nopacity = 1"), "");
+    assert_eq!(seen.lost_looks, [""; 0]);
+}
+
+#[test]
 fn an_import_writes_the_look_of_its_parts_into_the_scene() {
     let folder = Folder::new();
     folder.gltf("a.gltf", &format!("{RED},{RED}"), "");
@@ -318,4 +377,26 @@ fn the_files_of_a_scene_are_those_of_its_scenery_and_of_its_light_too() {
     // What is no picture is named with its file when the scene is built.
     let faults = format!("{:?}", scene.build().unwrap_err().problems());
     assert!(faults.contains("cannot be read as the light"), "{faults}");
+}
+
+#[test]
+fn the_files_of_a_scene_are_those_that_its_meshes_are_read_with_too() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.0.path().join("parts")).unwrap();
+    folder.gltf("Box.GLTF", &format!("{STEEL},{STEEL}"), "");
+    let libraries = "mtllib my lib.mtl\nmtllib none.mtl\nmtllib ../box.bin\n";
+    folder.write("parts/a.OBJ", format!("{libraries}{TETRAHEDRON}"));
+    folder.write("parts/my lib.mtl", "");
+    let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { mesh = \"parts/a.OBJ\" }\n\
+        [[scenery]]\nname = \"s\"\nshape = { mesh = \"Box.GLTF\" }\n";
+    let scene = Scene::parse("s.toml", text, folder.0.path()).unwrap();
+    let files = scene.files().unwrap();
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        names,
+        ["parts/a.OBJ", "parts/my lib.mtl", "Box.GLTF", "box.bin"]
+    );
+    for (name, found) in &files {
+        assert_eq!(*found, folder.0.path().join(name));
+    }
 }

@@ -195,12 +195,6 @@ impl Plan<'_> {
                     (below(folder, &beside)?, found, Mode::Plain)
                 }
             };
-            if found.extension().is_some_and(|ending| ending == "gltf") {
-                return Err(Failure::BadInput(format!(
-                    "{}: what lies beside a .gltf file is not copied with it; export it as .glb",
-                    found.display()
-                )));
-            }
             let place = Path::new("etc").join(place);
             if files.iter().all(|file| file.path != place) {
                 files.push(File {

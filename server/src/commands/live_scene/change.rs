@@ -3,10 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use taut_scene::{EditedKey, Scene};
+use taut_scene::{EditedKey, FinishedFile, Scene};
 
 use super::load::{Loader, Next};
-use crate::commands::finished_file::replace;
 use crate::session::Session;
 use crate::session::operator::SceneWish;
 use crate::shared::failure::Failure;
@@ -106,7 +105,7 @@ pub(super) fn write_scene(file: &str, text: &str, read: &str) -> Result<(), Stri
             "{file} was changed since it was read; take that first (choose the scene anew, or serve with --follow-scene)"
         ));
     }
-    replace(path, text).map_err(|error| {
+    FinishedFile::replace(path, text).map_err(|error| {
         format!(
             "{file} cannot be written ({error}); it is as it was; check its folder's permissions"
         )

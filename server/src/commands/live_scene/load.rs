@@ -158,7 +158,7 @@ fn refuse_to_follow(args: &ServeArgs, workbench: &Workbench) -> Result<(), Failu
     }
     if workbench.monitoring.record.is_some() {
         return Err(Failure::bad_input(
-            "--follow-scene begins a session for each scene, and each would write over the file of [monitoring] record; take record out, or serve without --follow-scene",
+            "--follow-scene begins a session for each scene, and the file of [monitoring] record is of one; take record out, or serve without --follow-scene",
         ));
     }
     match &workbench.device {

@@ -16,11 +16,11 @@ use god_object::surface::EnergyObserver;
 use god_object::{Settings, StartError, StepReport, World};
 use indicatif::ProgressBar;
 use taut_scene::{
-    BuiltMotion, DeviceTrace, FidelityPlan, Onlooker, ReplayRow, ReplayWriter, Runner, Scene,
+    BuiltMotion, DeviceTrace, FidelityPlan, FinishedFile, Onlooker, ReplayRow, ReplayWriter,
+    Runner, Scene,
 };
 
 use crate::cli::{MethodChoice, ReplayArgs};
-use crate::commands::finished_file::FinishedFile;
 use crate::loops::fidelity::FidelityWatch;
 use crate::loops::realtime::thread_cpu_time;
 use crate::report::terminal::Terminal;

@@ -12,9 +12,10 @@ use god_object::{Coupling, GodObject};
 use taut_recording::{
     ForceRecord, RecordReader, Recording, SceneOrigin, UpdateRecord, identity_of,
 };
-use taut_scene::{BuiltMotion, BuiltScene, ReplayRow, ReplayWriter, Scene, SceneSource};
+use taut_scene::{
+    BuiltMotion, BuiltScene, FinishedFile, ReplayRow, ReplayWriter, Scene, SceneSource,
+};
 
-use crate::commands::finished_file::FinishedFile;
 use crate::loops::realtime::thread_cpu_time;
 use crate::report::RecordedReport;
 use crate::shared::failure::Failure;

@@ -34,13 +34,21 @@ pub(super) fn run(
     if out.exists() {
         return Err(in_the_way(out));
     }
+    let folder = out.parent().unwrap_or(Path::new(""));
+    // Before a question is asked.
+    if folder != Path::new("") && !folder.is_dir() {
+        return Err(Failure::BadInput(format!(
+            "{} is no folder, so {} cannot be written; make it, or give another --out",
+            folder.display(),
+            out.display()
+        )));
+    }
     let found = Found::here();
     let mut questions = Questions::new(input, output, args.yes);
     questions.tell(&found.to_string())?;
     let answers = ask(&mut questions, &found)?;
     let text = answers.text();
     // What is written is good, or is not written.
-    let folder = out.parent().unwrap_or(Path::new(""));
     Workbench::parse(&out.display().to_string(), &text, folder)?;
     let mut file = std::fs::File::create_new(out).map_err(|error| match error.kind() {
         std::io::ErrorKind::AlreadyExists => in_the_way(out),

@@ -1,6 +1,7 @@
 //! A build without the monitor: it says so when it is asked for one.
 
 use std::convert::Infallible;
+use std::path::Path;
 use std::sync::Arc;
 
 use super::{MonitorPicture, MonitorSettings, MonitorSources, NetworkCounts, Severity};
@@ -35,6 +36,11 @@ impl MonitorFeed {
 
     /// The stream's own address.
     pub fn stream_address(&self) -> Option<&str> {
+        match self.0 {}
+    }
+
+    /// The file to which it is written.
+    pub fn recording(&self) -> Option<&Path> {
         match self.0 {}
     }
 

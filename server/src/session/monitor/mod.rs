@@ -38,7 +38,7 @@ pub struct MonitorSettings {
     pub grpc_port: u16,
     /// TCP port of the web page; 0 takes a free one.
     pub web_port: u16,
-    /// Also write everything to this `.rrd` file.
+    /// Also write everything to this new `.rrd` file.
     pub record: Option<PathBuf>,
     /// Most bytes of history kept for late observers.
     pub memory_limit_bytes: u64,

@@ -2,6 +2,7 @@
 //!
 //! Everything is told in the scene's own frame: screens and head are brought there from the workbench.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
@@ -78,6 +79,11 @@ impl MonitorFeed {
     /// The stream's own address.
     pub fn stream_address(&self) -> Option<&str> {
         self.monitor.stream_address()
+    }
+
+    /// The file to which it is written.
+    pub fn recording(&self) -> Option<&Path> {
+        self.monitor.recording()
     }
 
     /// Shows a line at the newest session time; never waits.

@@ -3,6 +3,7 @@
 pub(crate) mod content;
 pub mod devices;
 mod fidelity;
+mod monitoring;
 mod refusals;
 mod stability;
 pub mod workbench;

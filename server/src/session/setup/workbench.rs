@@ -13,19 +13,19 @@ use taut_bridge::{
 use taut_link::{AlsoKey, ClusterKey, MulticastOptions, read_key_file};
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
 use taut_scene::{
-    BuiltScene, Device, HeadTracking, Monitoring, RealTimeMode, Scene, TransportKind, Viewer,
-    Workbench, WrenchFrame,
+    BuiltScene, Device, HeadTracking, RealTimeMode, Scene, TransportKind, Viewer, Workbench,
+    WrenchFrame,
 };
 
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
 use crate::session::frames;
 use crate::session::head::{HeadMotion, HeadSource, Sway, TrackerSource};
-use crate::session::monitor::MonitorSettings;
 use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
 use crate::session::setup::devices::{device, input};
+use crate::session::setup::monitoring::monitor;
 use crate::session::setup::refusals::{
     borne, dynamics_of, few_motions, no_token_is_the_key, where_coupled,
 };
@@ -156,7 +156,7 @@ pub fn session_setup(
         observers: ObserverSettings::of(workbench)?,
         operator: OperatorSetup::of(workbench)?,
         realtime,
-        monitor: monitor(&workbench.monitoring, overrides),
+        monitor: monitor(&workbench.monitoring, overrides)?,
     })
 }
 
@@ -364,17 +364,4 @@ fn realtime(workbench: &Workbench) -> RealtimeSettings {
         god_object_core: wanted.god_object_core,
         lock_memory: true,
     }
-}
-
-fn monitor(wanted: &Monitoring, overrides: &Overrides) -> Option<MonitorSettings> {
-    let record = overrides.record.clone().or_else(|| wanted.record.clone());
-    let serve = wanted.enabled && !overrides.no_monitor;
-    (serve || overrides.record.is_some()).then_some(MonitorSettings {
-        bind: wanted.bind,
-        grpc_port: wanted.grpc_port,
-        web_port: wanted.web_port,
-        record,
-        memory_limit_bytes: wanted.memory_limit,
-        serve,
-    })
 }

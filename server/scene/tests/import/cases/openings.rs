@@ -23,6 +23,14 @@ pub(super) fn openings() -> Vec<Case> {
     let ((one, whole), (three, _)) = (holed(1), holed(3));
     let cup = || without(part(), |p| p[2] == HALF[2]);
     let flat = || sheet([0.06, 0.04], [6, 4]);
+    // A cell of 4 mm is gone near each corner: four edges and less than a percent of the area each.
+    let plate = || {
+        let in_cell = |c: f64, middle: f64| (c - middle).abs() < 0.0021;
+        without(sheet([0.06, 0.04], [15, 10]), |[x, y, _]| {
+            [0.006, 0.054].iter().any(|middle| in_cell(*x, *middle))
+                && [0.006, 0.034].iter().any(|middle| in_cell(*y, *middle))
+        })
+    };
     let bent = || {
         mapped(flat(), |[x, y, _]| {
             if x > 0.03 {
@@ -105,6 +113,15 @@ pub(super) fn openings() -> Vec<Case> {
             flat(),
             &["thickened"],
             (1, 2.4e-6),
+        )
+        .options("--thicken 0.001"),
+        good(
+            "plate-thick.stl",
+            "an open sheet with four holes for bolts, to be 1 mm thick",
+            stl(&plate()),
+            plate(),
+            &["thickened"],
+            (1, 2.336e-6),
         )
         .options("--thicken 0.001"),
         good(
