@@ -54,7 +54,6 @@ fn authority(text: &str) -> Option<(IpAddr, Option<u16>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use proptest::prelude::*;
 
     const HERE: Option<&str> = Some("127.0.0.1:9876");
