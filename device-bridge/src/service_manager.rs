@@ -16,6 +16,8 @@ use sd_notify::NotifyState;
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 /// Looks in one period of the manager's watchdog, at least.
 const LOOKS_PER_WATCHDOG: u32 = 4;
+/// Longest that a service may take to begin another time: its unit's `TimeoutStartSec`, which holds for the first time.
+const BEGINNING: Duration = Duration::from_secs(120);
 
 /// Whether there is a manager to tell.
 #[must_use]
@@ -23,25 +25,49 @@ pub fn is_there() -> bool {
     std::env::var_os("NOTIFY_SOCKET").is_some()
 }
 
-/// Tells until `is_over`, and then that. `turns`: what each loop has done so far; `status`: what is said once all have begun.
+/// Tells until `is_over`. `turns`: what each loop has done so far; `status`: what is said once all have begun.
 pub fn run<const N: usize>(status: &str, turns: impl Fn() -> [u64; N], is_over: impl Fn() -> bool) {
-    let period = sd_notify::watchdog_enabled().map_or(LOOK_PERIOD, |watchdog| {
+    let watchdog = sd_notify::watchdog_enabled();
+    let period = watchdog.map_or(LOOK_PERIOD, |watchdog| {
         LOOK_PERIOD.min(watchdog / LOOKS_PER_WATCHDOG)
     });
     let mut progress = Progress::<N>::default();
     while !is_over() {
         match progress.look(turns()) {
-            Life::Begins => tell(&[
-                NotifyState::Ready,
-                NotifyState::Status(status),
-                NotifyState::Watchdog,
-            ]),
+            Life::Begins => {
+                let mut said = vec![
+                    NotifyState::Ready,
+                    NotifyState::Status(status),
+                    NotifyState::Watchdog,
+                ];
+                said.extend(watchdog.and_then(watched_within));
+                tell(&said);
+            }
             Life::GoesOn => tell(&[NotifyState::Watchdog]),
             Life::Stands => {}
         }
         std::thread::sleep(period);
     }
+}
+
+/// Tells that the service stops. A manager ends the process after that, whatever is told later.
+pub fn stops() {
     tell(&[NotifyState::Stopping]);
+}
+
+/// Tells that the loops make way for others in the same process, which [`run`] is to tell of: until these have begun, no sign of life is missed.
+pub fn begins_again() {
+    let mut said = vec![NotifyState::Status("begins again")];
+    if sd_notify::watchdog_enabled().is_some_and(|usual| usual < BEGINNING) {
+        said.extend(watched_within(BEGINNING));
+    }
+    tell(&said);
+}
+
+/// By what time after one sign of life the manager is to miss the next.
+fn watched_within(period: Duration) -> Option<NotifyState<'static>> {
+    let us = u32::try_from(period.as_micros()).ok()?;
+    Some(NotifyState::WatchdogUsec(us))
 }
 
 /// Turns of a loop, counted by it and looked at by others. Wait-free.
@@ -81,7 +107,7 @@ pub struct ServiceNotifier {
 }
 
 impl ServiceNotifier {
-    /// As [`run`], in a thread of its own, until `is_over` or until this is dropped; `None` where there is nobody to tell.
+    /// As [`run`] and then [`stops`], in a thread of its own, until `is_over` or until this is dropped; `None` where there is nobody to tell.
     pub fn start<const N: usize>(
         status: &'static str,
         turns: [Turns; N],
@@ -99,6 +125,7 @@ impl ServiceNotifier {
                 run(status, so_far, || {
                     is_over() || dropped.load(Ordering::Relaxed)
                 });
+                stops();
             });
         match thread {
             Ok(thread) => Some(Self {

@@ -447,6 +447,7 @@ fn of_two_editors_the_later_one_builds_upon_the_first_or_hears_that_it_was_faste
         code == Some(0) && said.contains("plate.color=\"#30c030\""),
         "{said}"
     );
+    assert!(said.contains("  plate.roughness: as usual\n"), "{said}");
     assert!(
         said.contains("not in the file: coupling.k_h: as usual -> 1500"),
         "{said}"

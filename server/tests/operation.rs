@@ -179,6 +179,45 @@ fn a_service_manager_hears_ready_then_signs_of_life_then_stopping() {
     assert!(ended.status.success(), "{ended:?}");
 }
 
+/// A manager that hears of a stop ends the process soon after, whatever runs in it by then.
+#[test]
+fn another_scene_is_no_stop_to_a_service_manager() {
+    let place = Workplace::new();
+    let path = place.path("notify");
+    let manager = UnixDatagram::bind(&path).expect("a socket");
+    manager.set_read_timeout(Some(PATIENCE)).expect("a socket");
+    let hear = || {
+        let mut bytes = [0; 1024];
+        let length = manager.recv(&mut bytes).expect("a message in time");
+        String::from_utf8_lossy(&bytes[..length]).into_owned()
+    };
+    let server = serve(
+        &place,
+        &["--follow-scene"],
+        &[
+            ("NOTIFY_SOCKET", path.to_str().expect("a path")),
+            ("WATCHDOG_USEC", "2000000"),
+        ],
+    );
+    assert!(hear().contains("READY=1"));
+    let other = workbench().replace("\"sphere-on-plane\"", "\"peg-in-a-hole\"");
+    place.write("workbench.toml", &other);
+    let mut heard = String::new();
+    wait_until("the loops of the other scene", || {
+        heard.push_str(&hear());
+        heard.contains("READY=1")
+    });
+    assert!(!heard.contains("STOPPING=1"), "{heard}");
+    // Between the two nothing gives a sign of life, and it may take long.
+    let between = heard.find("WATCHDOG_USEC=120000000");
+    let again = heard.rfind("WATCHDOG_USEC=2000000");
+    assert!(between.is_some() && between < again, "{heard}");
+    server.signal("-TERM");
+    wait_until("it says that it stops", || hear().contains("STOPPING=1"));
+    let ended = server.ended();
+    assert!(ended.status.success(), "{ended:?}");
+}
+
 /// A client's part of the same: it is ready while it waits for a server that is not there, alive, and stops when it is told to.
 #[test]
 fn bridge_tracker_and_recorder_tell_the_service_manager_that_they_live() {

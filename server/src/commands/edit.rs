@@ -141,13 +141,17 @@ fn overview(text: &str) -> Option<String> {
             ("color", "color"),
             ("opacity", "opacity"),
             ("friction", "surface.friction"),
+            ("roughness", "roughness"),
+            ("metallic", "metallic"),
         ];
         let is_fixed = |key: &str| key.starts_with("pose") && object["moves"] == true;
         for (shown, key) in keys {
             let value = object.get(shown)?;
+            let name = shell_word(&Printable(name).to_string());
             if !value.is_null() && !is_fixed(key) {
-                let name = shell_word(&Printable(name).to_string());
                 let _ = writeln!(lines, "{name}.{key}={value}");
+            } else if matches!(key, "roughness" | "metallic") {
+                let _ = writeln!(lines, "  {name}.{key}: as usual");
             }
         }
     }
@@ -181,8 +185,8 @@ mod tests {
             "scene": {
                 "coupling": { "k_h": 2000.0, "stiffness": 1000.0 },
                 "objects": [{ "name": "b\u{1b}", "position": [0, 0, 1], "rotation": [1, 0, 0, 0], "color": "#ffffff",
-                              "opacity": 1.0, "friction": null, "moves": true }, { "name": "a b", "position": [0, 0, 1], "rotation": null,
-                              "color": null, "opacity": null, "friction": 0.5, "moves": false }],
+                              "opacity": 1.0, "friction": null, "roughness": 0.25, "metallic": null, "moves": true }, { "name": "a b", "position": [0, 0, 1], "rotation": null,
+                              "color": null, "opacity": null, "friction": 0.5, "roughness": null, "metallic": 1.0, "moves": false }],
                 "more": 3
             }
         });
@@ -192,6 +196,8 @@ mod tests {
         assert!(!text.contains("rotation") && !text.contains('\u{1b}'));
         assert!(text.contains("'a b'.pose.position=[0,0,1]\n'a b'.surface.friction=0.5\n"));
         assert_eq!(text.matches("friction").count(), 1);
+        assert!(text.contains(".roughness=0.25\n") && text.contains(".metallic: as usual\n"));
+        assert!(text.contains("  'a b'.roughness: as usual\n'a b'.metallic=1.0\n"));
         assert_eq!(overview("{}"), None);
     }
 }

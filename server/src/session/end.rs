@@ -1,5 +1,7 @@
 //! The end of a session, and what was measured.
 
+use std::sync::atomic::Ordering;
+
 use crate::report::SessionReport;
 use crate::report::terminal::Terminal;
 use crate::session::monitor::{MonitorFeed, Severity};
@@ -15,8 +17,8 @@ impl Session {
     }
 
     /// The same where another session begins at once: nodes, bridge and observers join that one.
-    pub fn make_way(mut self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
-        self.makes_way = true;
+    pub fn make_way(self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
+        self.makes_way.store(true, Ordering::Relaxed);
         self.conclude(terminal)
     }
 
@@ -68,7 +70,7 @@ impl Session {
             page.end();
         }
         if let Some(link) = self.link.take() {
-            if self.makes_way {
+            if self.makes_way.load(Ordering::Relaxed) {
                 self.runtime.block_on(link.make_way());
             } else {
                 self.runtime.block_on(link.shutdown());

@@ -28,6 +28,7 @@ mod threads;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -87,7 +88,7 @@ pub struct Session {
     operator: Option<OperatorPage>,
     link: Option<ServerLink>,
     /// Another session begins when this one ends.
-    makes_way: bool,
+    makes_way: Arc<AtomicBool>,
     runtime: Runtime,
     /// While it is held, idle cores wait at work.
     _awake: Option<Awake>,

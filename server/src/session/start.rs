@@ -152,7 +152,7 @@ impl Session {
             observers,
             operator,
             link: Some(link),
-            makes_way: false,
+            makes_way: Arc::default(),
             runtime,
             _awake: awake,
         };

@@ -1,7 +1,7 @@
 //! The threads of a session: who runs, at which priority, woken by what.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use taut_bridge::realtime::{pin_to_core, sleep_until};
@@ -193,6 +193,7 @@ impl Session {
             return Ok(());
         }
         let (statistics, shutdown) = (self.statistics.clone(), self.shutdown.clone());
+        let makes_way = self.makes_way.clone();
         self.start_thread("notify", Scheduling::Background, None, move || {
             let ticks = || {
                 [
@@ -201,6 +202,11 @@ impl Session {
                 ]
             };
             service_manager::run("the loops run", ticks, || shutdown.is_asked());
+            if makes_way.load(Ordering::Relaxed) {
+                service_manager::begins_again();
+            } else {
+                service_manager::stops();
+            }
         })
     }
 

@@ -65,16 +65,7 @@ impl Wanted {
 
     /// Another scene, or this one as its file is, with some keys set.
     fn another(&self, named: &str) -> Result<(Next, String), Failure> {
-        let is_it = |scene: &&String| {
-            let file = Path::new(scene).file_name();
-            scene.as_str() == named || file.is_some_and(|file| file == named)
-        };
-        let Some(name) = self.scenes.iter().find(is_it) else {
-            return Err(Failure::BadInput(format!(
-                "the scene \"{named}\" is none of those that may be chosen ({}); name it in [operator] scenes of the workbench file",
-                self.scenes.join(", ")
-            )));
-        };
+        let name = chosen(&self.scenes, named)?;
         let read = Scene::named_or_file(name)?;
         let (edited, keys) = read.edited(&self.wish.edits)?;
         let mut next = self.loader.choose(name, Some(edited))?;
@@ -84,6 +75,27 @@ impl Wanted {
             what = format!("{what}, {}", tell(&keys, &mut next.not_kept));
         }
         Ok((next, what))
+    }
+}
+
+/// Which of the scenes that may be chosen is named: by its whole name, or by that of its file where one alone has it.
+fn chosen<'s>(scenes: &'s [String], named: &str) -> Result<&'s str, Failure> {
+    let all = scenes.iter().map(String::as_str);
+    if let Some(scene) = all.clone().find(|scene| *scene == named) {
+        return Ok(scene);
+    }
+    let is_it = |scene: &&str| Path::new(scene).file_name().is_some_and(|f| f == named);
+    let found: Vec<&str> = all.filter(is_it).collect();
+    match found[..] {
+        [only] => Ok(only),
+        [] => Err(Failure::BadInput(format!(
+            "the scene \"{named}\" is none of those that may be chosen ({}); name it in [operator] scenes of the workbench file",
+            scenes.join(", ")
+        ))),
+        _ => Err(Failure::BadInput(format!(
+            "the scene \"{named}\" is the file's name of several that may be chosen; write one of {}",
+            found.join(", ")
+        ))),
     }
 }
 
@@ -110,4 +122,30 @@ pub(super) fn write_scene(file: &str, text: &str, read: &str) -> Result<(), Stri
             "{file} cannot be written ({error}); it is as it was; check its folder's permissions"
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_is_chosen_by_its_whole_name_before_a_name_of_a_file() {
+        let names = [
+            "lab/other.toml",
+            "other.toml",
+            "a/plate.toml",
+            "b/plate.toml",
+            "c/hole.toml",
+        ];
+        let scenes = names.map(str::to_owned);
+        let asked = |named: &str| chosen(&scenes, named).map_err(|why| why.to_string());
+        for name in names {
+            assert_eq!(asked(name), Ok(name));
+        }
+        assert_eq!(asked("hole.toml"), Ok("c/hole.toml"));
+        let several = asked("plate.toml").expect_err("two have it");
+        assert!(several.contains("write one of a/plate.toml, b/plate.toml"));
+        let none = asked("c").expect_err("a folder");
+        assert!(none.contains("none of those"));
+    }
 }

@@ -99,13 +99,15 @@ fn contents(scene: &str, paths: &[PathBuf]) -> Vec<Vec<u8>> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
     use std::thread;
     use std::time::Duration;
 
     use clap::Parser;
-    use taut_scene::SHIPPED_WORKBENCH;
+    use taut_scene::{SHIPPED_WORKBENCH, Scene};
     use taut_test_kit::BALL_ON_FLOOR;
 
+    use super::super::LiveScene;
     use super::super::load::Loader;
     use super::*;
     use crate::cli::ServeArgs;
@@ -134,28 +136,34 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_scene_that_is_written_while_it_is_read_makes_one_session_and_that_of_the_new_text() {
-        let place = tempfile::tempdir().expect("a directory");
+    /// `taut serve --follow-scene` of a workbench file in `place`; the scene's file.
+    fn followed_scene(place: &Path) -> (ServeArgs, PathBuf) {
         let [config, key, scene] =
-            ["workbench.toml", "key", "scene.toml"].map(|name| place.path().join(name));
+            ["workbench.toml", "key", "scene.toml"].map(|name| place.join(name));
         let scene_name = scene.to_str().expect("a plain path");
         let workbench = SHIPPED_WORKBENCH.replace(
             "scene = \"peg-in-a-hole\"",
             &format!("scene = \"{scene_name}\""),
         );
         std::fs::write(&config, workbench).expect("written");
-        let write = |k_h: &str| {
-            let text = BALL_ON_FLOOR.replace("2000.0", k_h);
-            std::fs::write(&scene, text).expect("written");
-        };
-        write("2000.0");
+        std::fs::write(&scene, BALL_ON_FLOOR).expect("written");
         taut_link::create_key_file(&key).expect("a key");
         let words = ["serve".as_ref(), "--config".as_ref(), config.as_os_str()];
         let more = ["--key".as_ref(), key.as_os_str(), "--follow-scene".as_ref()];
         let args = Cli::try_parse_from([words, more].concat())
             .expect("valid")
             .args;
+        (args, scene)
+    }
+
+    #[test]
+    fn a_scene_that_is_written_while_it_is_read_makes_one_session_and_that_of_the_new_text() {
+        let place = tempfile::tempdir().expect("a directory");
+        let (args, scene) = followed_scene(place.path());
+        let write = |k_h: &str| {
+            let text = BALL_ON_FLOOR.replace("2000.0", k_h);
+            std::fs::write(&scene, text).expect("written");
+        };
         let loader = Loader::new(args, Overrides::default());
         let mut first = loader.load().unwrap_or_else(|error| panic!("{error}"));
         let mut watch = first.files.take().expect("it follows");
@@ -165,5 +173,36 @@ mod tests {
         assert!(none.is_none(), "a session of the old text");
         let next = followed(&mut watch, &loader, || ()).expect("the new one");
         assert!(next.in_file.contains("1500.0"), "{}", next.in_file);
+    }
+
+    #[test]
+    fn what_is_kept_of_a_chosen_scene_is_no_change_of_its_file() {
+        let place = tempfile::tempdir().expect("a directory");
+        let (args, _) = followed_scene(place.path());
+        let other = place.path().join("other.toml");
+        std::fs::write(&other, BALL_ON_FLOOR).expect("written");
+        let name = other.to_str().expect("a plain path");
+        let read = Scene::named_or_file(name).expect("a scene");
+        let (edited, _) = read
+            .edited(&["coupling.k_h=1500.0"])
+            .expect("it can be set");
+
+        let mut live = LiveScene::new(&args, Overrides::default(), Arc::default());
+        let chosen = live.loader.choose(name, Some(edited));
+        let mut next = chosen.unwrap_or_else(|error| panic!("{error}"));
+        next.in_file = read.text().clone();
+        let written = live.write(&mut next);
+        written.unwrap_or_else(|error| panic!("{error}"));
+        let kept = std::fs::read_to_string(&other).expect("a file");
+        assert!(kept.contains("1500.0"), "{kept}");
+
+        live.loader.keep(next.chosen.take(), &next.setup);
+        let again = live.loader.load();
+        let again = again.unwrap_or_else(|error| panic!("{error}"));
+        let [known, found] = [next.files, again.files].map(|files| files.expect("it follows"));
+        assert!(
+            known.contents == found.contents,
+            "a session of its own writing"
+        );
     }
 }

@@ -257,9 +257,9 @@ impl LiveScene {
                 "the program broke down over it; look at the server's log",
             ))
         });
-        let written = made.and_then(|change| {
+        let written = made.and_then(|mut change| {
             if change.keep {
-                self.write(&change.next)?;
+                self.write(&mut change.next)?;
             }
             Ok(change)
         });
@@ -284,7 +284,7 @@ impl LiveScene {
     }
 
     /// Gives the file of a scene that is about to run what it runs with.
-    fn write(&mut self, next: &Next) -> Result<(), Failure> {
+    fn write(&mut self, next: &mut Next) -> Result<(), Failure> {
         let (file, text) = (&next.workbench.scene, next.setup.scene.text());
         if *text == next.in_file {
             return Ok(());
@@ -293,7 +293,11 @@ impl LiveScene {
             return Err(Failure::bad_input(NO_FILE));
         }
         write_scene(file, text, &next.in_file).map_err(Failure::failed)?;
-        self.wrote(file);
+        // Of another scene other files are watched from now on.
+        match &mut next.files {
+            Some(files) => files.wrote(file),
+            None => self.wrote(file),
+        }
         Ok(())
     }
 }

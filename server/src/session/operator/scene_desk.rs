@@ -138,9 +138,19 @@ impl SceneDesk {
         Ok(Box::new(move || lock(&answer).take()))
     }
 
-    /// The wish that waits.
+    /// The wish that waits; one that was meant for a scene that is gone by now is answered here.
     pub(crate) fn take(&self) -> Option<AskedScene> {
-        lock(&self.state).waiting.take()
+        let (asked, runs) = {
+            let mut state = lock(&self.state);
+            (state.waiting.take()?, state.revision)
+        };
+        match check_revision(asked.wish.revision, runs) {
+            Ok(()) => Some(asked),
+            Err(why) => {
+                asked.answer(Err(why));
+                None
+            }
+        }
     }
 }
 
@@ -211,6 +221,21 @@ mod tests {
         show(&desk, 8);
         assert!(refusal(&desk, edit).contains("revision 7 of the scene, and 8 runs"));
         assert!(desk.ask(b"{}", peer()).is_ok(), "of whatever runs");
+    }
+
+    #[test]
+    fn a_wish_that_waits_while_another_scene_comes_is_not_for_that() {
+        let desk = open();
+        let edit = br#"{"revision": 7, "edits": ["a.opacity=0.5"]}"#;
+        let mut outcome = desk.ask(edit, peer()).expect("taken");
+        show(&desk, 8);
+        assert!(desk.take().is_none());
+        let said = outcome().expect("answered").expect_err("refused");
+        assert!(said.contains("revision 7 of the scene, and 8 runs"));
+        let edit = br#"{"edits": ["a.opacity=0.5"]}"#;
+        assert!(desk.ask(edit, peer()).is_ok(), "it keeps nobody out");
+        show(&desk, 9);
+        assert!(desk.take().is_some(), "of whatever runs");
     }
 
     #[test]

@@ -58,6 +58,9 @@ struct ObjectView<'v> {
     /// `#rrggbb`, sRGB.
     color: String,
     opacity: f32,
+    /// `null`: its mesh file's, else that of bodies of its kind; so of the next.
+    roughness: Option<f32>,
+    metallic: Option<f32>,
     friction: Option<f64>,
     /// Moves as a trace says.
     moves: bool,
@@ -100,6 +103,14 @@ fn object<'v>(
     kind: &'static str,
 ) -> ObjectView<'v> {
     let obstacle = place.checked_sub(1).and_then(|i| scene.obstacles().get(i));
+    let look = match (place.checked_sub(1), obstacle) {
+        (None, _) => Some(&scene.god_object().appearance),
+        (Some(_), Some(obstacle)) => Some(&obstacle.appearance),
+        (Some(i), None) => {
+            let scenery = scene.scenery().get(i - scene.obstacles().len());
+            scenery.map(|scenery| &scenery.appearance)
+        }
+    };
     let [red, green, blue, opacity] = body.colour;
     let [r, g, b] = srgb([red, green, blue]);
     ObjectView {
@@ -112,6 +123,8 @@ fn object<'v>(
         rotation: body.pose.rotation,
         color: format!("#{r:02x}{g:02x}{b:02x}"),
         opacity,
+        roughness: look.and_then(|look| look.roughness),
+        metallic: look.and_then(|look| look.metallic),
         friction: obstacle.map(|obstacle| obstacle.surface.friction),
         moves: obstacle.is_some_and(|obstacle| obstacle.motion.is_some()),
     }
