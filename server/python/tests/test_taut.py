@@ -8,6 +8,7 @@ import io
 import os
 import pathlib
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -79,6 +80,27 @@ class Replay(unittest.TestCase):
                 taut.replay("sphere-on-plane", trace, pathlib.Path(name) / "nowhere" / "answer.csv")
             self.assertEqual(trace.read_bytes(), before)
             self.assertEqual(len(list(pathlib.Path(name).iterdir())), 2)
+
+    def test_a_replay_can_be_interrupted_and_then_writes_nothing(self):
+        class Interrupted(Exception):
+            pass
+
+        def interrupt(*_):
+            raise Interrupted
+
+        with tempfile.TemporaryDirectory() as name:
+            trace, out = pathlib.Path(name) / "trace.csv", pathlib.Path(name) / "answer.csv"
+            rows = (f"{step},0,0,0.0{step % 9 + 1},1,0,0,0\n" for step in range(200_000))  # seconds of work, and the signal comes at its begin
+            trace.write_text("t,x,y,z,qw,qx,qy,qz\n" + "".join(rows))
+            before = signal.signal(signal.SIGALRM, interrupt)
+            try:
+                signal.setitimer(signal.ITIMER_REAL, 0.05)
+                with self.assertRaises(Interrupted):
+                    taut.replay("sphere-on-plane", trace, out)
+            finally:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+                signal.signal(signal.SIGALRM, before)
+            self.assertEqual([file.name for file in pathlib.Path(name).iterdir()], [trace.name])
 
     def test_the_notebook_runs(self):
         with tempfile.TemporaryDirectory() as name:
