@@ -25,7 +25,7 @@ pub(crate) struct FileReport {
     /// Cubic metres; `None` if it is no mesh.
     volume: Option<f64>,
     /// Metres; `None` if it is no mesh.
-    size: Option<[f64; 3]>,
+    size: Option<(f64, f64, f64)>,
     triangles: Option<usize>,
     watertight: Option<bool>,
     text: String,
@@ -50,7 +50,7 @@ pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<FileReport> {
         good: report.is_good(),
         problems: report.problems.iter().map(ToString::to_string).collect(),
         volume: mesh.map(|mesh| mesh.volume_m3),
-        size: mesh.map(|mesh| mesh.size_m),
+        size: mesh.map(|mesh| mesh.size_m.into()),
         triangles: mesh.map(|mesh| mesh.triangles),
         watertight: mesh.map(|mesh| mesh.watertight),
         file: report.file,

@@ -170,6 +170,16 @@ class Steps(unittest.TestCase):
             done = subprocess.run([os.environ["TAUT_PROGRAM"], "check", str(name)], capture_output=True, text=True)
             self.assertIn(str(taut.check(name)), done.stdout + done.stderr)
 
+    def test_the_figures_of_a_mesh_are_of_the_kinds_that_the_stub_names(self):
+        with tempfile.TemporaryDirectory() as name:
+            mesh = pathlib.Path(name) / "corner.obj"  # a tetrahedron, m
+            mesh.write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.2 0\nv 0 0 0.3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+            report = taut.check(mesh)
+        self.assertEqual(report.size, (0.1, 0.2, 0.3))
+        self.assertEqual((report.triangles, report.watertight), (4, True))
+        self.assertAlmostEqual(report.volume, 0.001)
+        self.assertIsNone(taut.check("nowhere.ply").size)
+
 
 class Threads(unittest.TestCase):
     def test_threads_with_scenes_of_their_own_and_with_a_shared_one_agree_with_one(self):
