@@ -70,6 +70,15 @@ fn replaced(path: &Path, change: impl FnOnce(String) -> String) {
     assert!(std::fs::write(path, change(text)).is_ok());
 }
 
+/// The text of a file without one of its records, counted from 1.
+fn without_record(text: &str, record: usize) -> String {
+    let others = text
+        .lines()
+        .enumerate()
+        .filter(|(number, _)| *number != record); // the header is line 0
+    others.map(|(_, line)| format!("{line}\n")).collect()
+}
+
 #[test]
 fn a_recorded_session_is_computed_again_bit_by_bit() {
     let directory = tempfile::tempdir().expect("no temporary directory");
@@ -148,13 +157,7 @@ fn a_recording_that_was_changed_is_found_out() {
         });
     };
     say_complete(true);
-    replaced(&updates, |text| {
-        text.lines()
-            .enumerate()
-            .filter(|(number, _)| *number != 50)
-            .map(|(_, line)| format!("{line}\n"))
-            .collect()
-    });
+    replaced(&updates, |text| without_record(&text, 50));
     match again(&path) {
         Err(error) => assert!(error.to_string().contains("not whole"), "{error}"),
         Ok(report) => panic!("{report}"),
@@ -189,6 +192,26 @@ fn a_recording_that_was_changed_is_found_out() {
     assert!(export["updates"].as_u64() > Some(UPDATES));
     let left_out = export["left_out"].to_string();
     assert!(left_out.contains("other bodies or settings"), "{left_out}");
+}
+
+#[test]
+fn a_lost_force_is_a_gap_and_what_is_behind_it_is_not_compared() {
+    let directory = tempfile::tempdir().expect("no temporary directory");
+    let path = directory.path().join("session");
+    record("sphere-on-plane", &path);
+    // As a queue that was full leaves it.
+    replaced(&path.join("recording.json"), |text| {
+        text.replace("\"complete\": true", "\"complete\": false")
+    });
+    replaced(&path.join("forces.csv"), |text| without_record(&text, 50));
+    match again(&path) {
+        Ok(report) => {
+            assert!(report.forces <= 49, "{report}");
+            assert_eq!(report.first_difference, None);
+            assert!(report.gap.is_some_and(|gap| gap.contains("not whole")));
+        }
+        Err(error) => panic!("{error}"),
+    }
 }
 
 #[test]

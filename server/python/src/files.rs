@@ -1,6 +1,7 @@
 //! Files: what is wrong with them, traces, and the replay of a trace.
 
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -9,6 +10,9 @@ use taut_scene::{
 };
 
 use crate::convert::{bad, bad_file, table};
+
+/// Time between two looks whether a signal came, such as that of Ctrl-C: each waits until the interpreter's lock is free.
+const SIGNAL_LOOK: Duration = Duration::from_millis(100);
 
 /// What was found about one file.
 #[pyclass(frozen, get_all, module = "taut")]
@@ -21,7 +25,7 @@ pub(crate) struct FileReport {
     /// Cubic metres; `None` if it is no mesh.
     volume: Option<f64>,
     /// Metres; `None` if it is no mesh.
-    size: Option<[f64; 3]>,
+    size: Option<(f64, f64, f64)>,
     triangles: Option<usize>,
     watertight: Option<bool>,
     text: String,
@@ -46,7 +50,7 @@ pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<FileReport> {
         good: report.is_good(),
         problems: report.problems.iter().map(ToString::to_string).collect(),
         volume: mesh.map(|mesh| mesh.volume_m3),
-        size: mesh.map(|mesh| mesh.size_m),
+        size: mesh.map(|mesh| mesh.size_m.into()),
         triangles: mesh.map(|mesh| mesh.triangles),
         watertight: mesh.map(|mesh| mesh.watertight),
         file: report.file,
@@ -82,7 +86,8 @@ pub(crate) fn replay<'py>(
     table(py, numbers, REPLAY_COLUMNS.split(',').count())
 }
 
-/// All columns of all rows; the file, if one is named, gets the bytes that `taut replay` writes, and is neither the scene nor the trace.
+/// All columns of all rows; the file, if one is named, gets the bytes that `taut replay` writes, and is neither the scene nor the trace. An
+/// exception of a signal's handler ends it, and nothing is written.
 fn rows(scene: &str, trace: &Path, out: Option<&Path>) -> PyResult<Vec<f64>> {
     let inputs = [Path::new(scene), trace];
     let built = Scene::named_or_file(scene)
@@ -101,7 +106,13 @@ fn rows(scene: &str, trace: &Path, out: Option<&Path>) -> PyResult<Vec<f64>> {
         .transpose()
         .map_err(cannot_write)?;
     let mut numbers = Vec::new();
+    let mut looked = Instant::now();
     for sample in trace.samples() {
+        if looked.elapsed() >= SIGNAL_LOOK {
+            // None: the interpreter ends, and runs no handler any more.
+            Python::try_attach(|py| py.check_signals()).transpose()?;
+            looked = Instant::now();
+        }
         let row = runner.row(sample.time, &sample.pose, &mut ());
         if let Some(writer) = &mut writer {
             writer.write(&row).map_err(cannot_write)?;

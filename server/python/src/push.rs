@@ -31,6 +31,8 @@ const CLOCK_LOOK: Duration = Duration::from_millis(5);
 pub(crate) struct PushWrench {
     #[pyo3(get)]
     server: String,
+    /// That joined. A fork has a copy of its keys and counts, but no network: two that seal under the same numbers would give the keys away.
+    process: u32,
     source: Mutex<Option<Source>>,
 }
 
@@ -53,6 +55,7 @@ impl PushWrench {
         let source = py.detach(|| Source::join(server, key, node)).map_err(bad)?;
         Ok(Self {
             server: server.to_owned(),
+            process: std::process::id(),
             source: Mutex::new(Some(source)),
         })
     }
@@ -64,6 +67,11 @@ impl PushWrench {
             return Err(bad(format!(
                 "the age of a wrench is {age} s; give the time since it was measured, 0 to {OLDEST} s"
             )));
+        }
+        if self.is_forked() {
+            return Err(bad(
+                "this source of forces was made in another process, which a fork cannot speak for; make one after the fork",
+            ));
         }
         match &mut *self.lock() {
             Some(source) => source.send(wrench, Duration::from_secs_f64(age), &self.server),
@@ -80,8 +88,10 @@ impl PushWrench {
 
     fn close(&self, py: Python<'_>) {
         let source = self.lock().take();
-        if let Some(source) = source {
-            py.detach(|| source.leave());
+        match source {
+            Some(source) if self.is_forked() => std::mem::forget(source),
+            Some(source) => py.detach(|| source.leave()),
+            None => {}
         }
     }
 
@@ -99,6 +109,20 @@ impl PushWrench {
     /// Held for moments, and never while the interpreter's lock is waited for.
     fn lock(&self) -> MutexGuard<'_, Option<Source>> {
         self.source.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn is_forked(&self) -> bool {
+        self.process != std::process::id()
+    }
+}
+
+impl Drop for PushWrench {
+    fn drop(&mut self) {
+        if self.is_forked() {
+            // Its threads are the parent's: whoever ended it here would wait for them for ever.
+            let source = self.source.get_mut();
+            std::mem::forget(source.unwrap_or_else(PoisonError::into_inner).take());
+        }
     }
 }
 

@@ -139,7 +139,7 @@ class push_wrench:
 
     `server` is HOST:PORT of a server with `[wrench_in]`; `key` the file of a credential of the role force, else the one that TAUT_KEY_FILE names; `node` a name
     of its own in the workbench. It joins a server that was lost again by itself, until it is closed: `with taut.push_wrench(...) as hand`.
-    Threads may share it. TautError: the key, the server or its answer is no good.
+    Threads may share it, a fork of the process may not: make one there. TautError: the key, the server or its answer is no good.
     """
 
     server: str
@@ -149,7 +149,8 @@ class push_wrench:
     def send(self, wrench: ArrayLike, age: float = 0.0) -> bool:
         """Sends force (N), then torque (N m) on the hand at the reference point, in the axes that `[wrench_in]` names; `age` is the time since it was measured,
         s, 0 to 1. Felt in full for 20 ms from its measurement on, then it fades, and is gone 115 ms after it (`max_age_ms` of the server): send at 50 Hz or more.
-        Waits for nothing. False: the server is away, and nothing was sent. TautError: no six finite numbers within 10^6, the server stopped, or it was closed.
+        Waits for nothing. False: the server is away, and nothing was sent. TautError: no six finite numbers within 10^6, the server stopped, it was closed, or
+        this is a fork of the process that made it.
         """
     def __enter__(self) -> Self: ...
     def __exit__(self, *_: object) -> None: ...

@@ -56,7 +56,7 @@ def export(
     for number, session in enumerate(map(pathlib.Path, sessions)):
         manifest = _manifest(session)
         did = task or manifest["scene"]
-        columns, notes = _frames(session, int(fps))
+        columns, notes = _frames(session, int(fps), manifest["records"])
         said += notes + ([] if manifest["complete"] else [f"{session}: not whole ({manifest['reason'] or 'the session did not come to its end'})"])
         count = len(columns["action"])
         if begin + count > MOST_FRAMES:
@@ -82,7 +82,8 @@ def _manifest(session):
         manifest = json.loads(path.read_text())
         if manifest["format"] != FORMAT:
             raise TautError(f"{path}: has format {manifest['format']}, and this wheel reads format {FORMAT}; use that of the program that wrote it")
-        return {key: manifest[key] for key in ("scene", "complete", "reason")}
+        written = manifest.get("records") or {}  # none until the end of a session, and in older recordings
+        return {key: manifest[key] for key in ("scene", "complete", "reason")} | {"records": {name: int(written[name]) for name in TIMES if name in written}}
     except OSError as error:
         raise TautError(f"{path}: cannot be read ({error.strerror}); name the directory of a recording") from error
     except TautError:
@@ -124,12 +125,15 @@ def _whole_lines(path):
     return 0
 
 
-def _frames(session, fps):
-    """The features at each frame, and what is to be said of them."""
+def _frames(session, fps, written):
+    """The features at each frame, and what is to be said of them; `written` are the records of each file at the end of the session, where it says so."""
     tables, said = {}, []
     for name in TIMES:
         tables[name], cut_off = _table(session, name)
         said += [f"{session / name}.csv: its last line is cut off, and was left out"] if cut_off else []
+        found = len(tables[name][TIMES[name]]) + cut_off
+        if found != written.get(name, found):
+            said.append(f"{session / name}.csv: ends after {found} records, but the session wrote {written[name]}; what is missing was left out")
     good = tables["haptics"].pop("faulty") == 0
     if not good.all():
         said.append(f"{session}: {np.count_nonzero(~good)} ticks had no good pose, and were left out")

@@ -112,6 +112,16 @@ class LeRobot(unittest.TestCase):
         self.assertLess(info["total_frames"], 2 * 50)
         self.assertGreater(info["total_frames"], 10)
 
+    def test_a_file_that_was_cut_between_two_lines_is_said_to_be(self):
+        cut = self.place / "cut"
+        shutil.copytree(self.sessions[0], cut)
+        lines = (cut / "updates.csv").read_bytes().splitlines(keepends=True)
+        (cut / "updates.csv").write_bytes(b"".join(lines[: len(lines) // 2]))
+        said = "\n".join(taut.lerobot.export([cut], self.place / "short"))
+        self.assertRegex(said, f"updates.csv: ends after {len(lines) // 2 - 1} records, but the session wrote {len(lines) - 1};")
+        said = "\n".join(taut.lerobot.export([self.sessions[0]], self.place / "all"))
+        self.assertNotIn("ends after", said)
+
     def test_what_cannot_be_exported_is_said_and_leaves_nothing(self):
         broken = self.place / "broken"
         shutil.copytree(self.sessions[0], broken)

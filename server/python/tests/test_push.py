@@ -122,6 +122,23 @@ class Push(unittest.TestCase):
         with self.assertRaisesRegex(taut.TautError, "no credential is named"):
             taut.push_wrench(session.server)
 
+    def test_a_fork_cannot_send_in_the_session_of_its_parent(self):
+        with Open(3 * PATIENCE) as session, session.pushing() as hand:
+            self.assertTrue(hand.send([0] * 6))
+            child = os.fork()
+            if not child:
+                ended = 1  # it could send, or something else was raised
+                try:
+                    hand.send([0] * 6)
+                except taut.TautError as error:
+                    hand.close()  # waits for no thread of the parent
+                    ended = 0 if "another process" in str(error) else 2
+                finally:
+                    os._exit(ended)
+            self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), 0)
+            self.assertTrue(hand.send([0] * 6))
+            self.assertEqual(hand.sent, 2)
+
     def test_a_session_that_ends_is_told(self):
         with Open(2) as session, session.pushing() as hand:
             with self.assertRaisesRegex(taut.TautError, "stopped"):

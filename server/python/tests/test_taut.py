@@ -8,6 +8,7 @@ import io
 import os
 import pathlib
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -80,6 +81,27 @@ class Replay(unittest.TestCase):
             self.assertEqual(trace.read_bytes(), before)
             self.assertEqual(len(list(pathlib.Path(name).iterdir())), 2)
 
+    def test_a_replay_can_be_interrupted_and_then_writes_nothing(self):
+        class Interrupted(Exception):
+            pass
+
+        def interrupt(*_):
+            raise Interrupted
+
+        with tempfile.TemporaryDirectory() as name:
+            trace, out = pathlib.Path(name) / "trace.csv", pathlib.Path(name) / "answer.csv"
+            rows = (f"{step},0,0,0.0{step % 9 + 1},1,0,0,0\n" for step in range(200_000))  # seconds of work, and the signal comes at its begin
+            trace.write_text("t,x,y,z,qw,qx,qy,qz\n" + "".join(rows))
+            before = signal.signal(signal.SIGALRM, interrupt)
+            try:
+                signal.setitimer(signal.ITIMER_REAL, 0.05)
+                with self.assertRaises(Interrupted):
+                    taut.replay("sphere-on-plane", trace, out)
+            finally:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+                signal.signal(signal.SIGALRM, before)
+            self.assertEqual([file.name for file in pathlib.Path(name).iterdir()], [trace.name])
+
     def test_the_notebook_runs(self):
         with tempfile.TemporaryDirectory() as name:
             trace = pathlib.Path(name) / "trace.csv"
@@ -147,6 +169,16 @@ class Steps(unittest.TestCase):
         for name in ("nowhere.ply", SCENES / "peg-in-a-hole.toml"):
             done = subprocess.run([os.environ["TAUT_PROGRAM"], "check", str(name)], capture_output=True, text=True)
             self.assertIn(str(taut.check(name)), done.stdout + done.stderr)
+
+    def test_the_figures_of_a_mesh_are_of_the_kinds_that_the_stub_names(self):
+        with tempfile.TemporaryDirectory() as name:
+            mesh = pathlib.Path(name) / "corner.obj"  # a tetrahedron, m
+            mesh.write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.2 0\nv 0 0 0.3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+            report = taut.check(mesh)
+        self.assertEqual(report.size, (0.1, 0.2, 0.3))
+        self.assertEqual((report.triangles, report.watertight), (4, True))
+        self.assertAlmostEqual(report.volume, 0.001)
+        self.assertIsNone(taut.check("nowhere.ply").size)
 
 
 class Threads(unittest.TestCase):

@@ -154,6 +154,14 @@ impl RecordedSession {
             Ok(_) => return Ok(None),
             Err(error) => return self.end_at(error.to_string()),
         };
+        // The coupling goes on from force to force: behind one that was lost it would come to something else.
+        let next = self.measured.forces + 1;
+        if force.sequence != next {
+            return self.end_at(format!(
+                "forces.csv: force {} stands where force {next} should; the recording is not whole, and cannot be computed again from there",
+                force.sequence
+            ));
+        }
         let mut update_us = 0.0;
         while self.god_object.constraint_set().sequence < force.constraint_sequence {
             match self.update()? {
