@@ -45,7 +45,7 @@ impl SpidarUartSettings {
         ForceDevice {
             grip: string_grip(&self.geometry, &SpidarPlacement::default()),
             delay_s: 1e-3,
-            scale: 1.0,
+            scale: None,
             renders_torque: true,
         }
     }
