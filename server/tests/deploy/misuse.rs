@@ -173,6 +173,32 @@ fn an_old_cluster_key_is_not_written_over_the_new_one() {
     }
 }
 
+/// The haptic PC draws nothing, so that its script knows no account that does.
+#[test]
+fn a_token_called_as_a_credential_of_a_screen_is_the_service_s() {
+    let place = prepared();
+    let name = "render-lab.token";
+    let operator = format!("[operator]\nenabled = true\ntoken_file = \"{name}\"\n");
+    let text = format!("{}\n{operator}", without_operator());
+    place.write("workbench.toml", &text);
+    place.write(name, &"0123456789abcdef".repeat(4));
+    let own = fs::Permissions::from_mode(0o600);
+    fs::set_permissions(place.path(name), own).expect("its mode");
+    let (code, said) = deploy(&place, &[]);
+    assert_eq!(code, Some(0), "{said}");
+    let folder = unpacked(&place, "haptic-pc");
+    let script = |name: &str| fs::read_to_string(folder.join(name)).expect("a script");
+    let line = format!("install -D -m 0600 -o taut -g taut etc/{name} /etc/taut/{name}");
+    let install = script("install");
+    assert!(install.lines().any(|there| there == line), "{install}");
+    let scripts = install + &script("uninstall");
+    assert!(!scripts.contains("$account"), "{scripts}");
+    // Where one draws, its credential is still that account's.
+    let install = fs::read_to_string(unpacked(&place, "left").join("install"));
+    let own = "-o \"$account\" etc/render-front.key";
+    assert!(install.expect("a script").contains(own));
+}
+
 fn without_operator() -> String {
     let mut table: Table = workbench().parse().expect("a workbench");
     table.remove("operator");
