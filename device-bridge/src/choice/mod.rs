@@ -112,8 +112,8 @@ pub struct ForceDevice {
     pub grip: Grip,
     /// From a reading to the force that answers it, beyond the loop's own period, s.
     pub delay_s: f64,
-    /// Metres on the workbench of one of its own.
-    pub scale: f64,
+    /// Metres on the workbench of one of its own; `None` where its metres are the scene's, however large that is drawn.
+    pub scale: Option<f64>,
     /// Whether it can turn a hand, not only push it.
     pub renders_torque: bool,
 }

@@ -111,7 +111,7 @@ impl HaplySettings {
         ForceDevice {
             grip: haply_grip(),
             delay_s: DELAY_S - 1.0 / RATE_HZ,
-            scale: self.mapping.scale,
+            scale: Some(self.mapping.scale),
             renders_torque: false,
         }
     }

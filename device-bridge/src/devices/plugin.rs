@@ -35,7 +35,7 @@ impl PluginSettings {
         ForceDevice {
             grip: haply_grip(),
             delay_s: 1e-3,
-            scale: self.mapping.scale,
+            scale: Some(self.mapping.scale),
             renders_torque: true,
         }
     }

@@ -69,7 +69,7 @@ impl PolhemSettings {
         ForceDevice {
             grip: polhem_grip(),
             delay_s: DELAY_S - 1.0 / RATE_HZ,
-            scale: self.mapping.scale,
+            scale: Some(self.mapping.scale),
             renders_torque: false,
         }
     }

@@ -45,7 +45,7 @@ impl SpidarUartSettings {
         ForceDevice {
             grip: string_grip(&self.geometry, &SpidarPlacement::default()),
             delay_s: 1e-3,
-            scale: 1.0,
+            scale: None,
             renders_torque: true,
         }
     }
@@ -62,8 +62,10 @@ impl SpidarUartSettings {
     ) -> Result<Box<dyn Device>, SpidarUartError> {
         use crate::devices::SpidarDevice;
         use crate::realtime::monotonic_now;
+        use crate::spidar_uart::{SpidarBoards, within_range};
 
-        let boards = crate::spidar_uart::SpidarBoards::open(&self.path, &self.geometry, priority)?;
+        let geometry = within_range(&self.geometry)?;
+        let boards = SpidarBoards::open(&self.path, &geometry, priority)?;
         let turn = Rotation3::from_matrix_unchecked(*self.axes.matrix());
         let workbench = placement.workbench_from_world.isometry.rotation;
         let around = SpidarPlacement::around(
@@ -72,7 +74,6 @@ impl SpidarUartSettings {
             placement.start.rotation,
             placement.reference_point,
         );
-        let geometry = self.geometry.clone();
         let device = SpidarDevice::calibrated_at_centre(geometry, boards, around, monotonic_now());
         let device = device.map_err(SpidarUartError::Strings)?;
         tracing::info!(

@@ -61,7 +61,7 @@ impl WoodenSettings {
         ForceDevice {
             grip: self.grip(),
             delay_s: DELAY_S - 1.0 / RATE_HZ,
-            scale: self.mapping.scale,
+            scale: Some(self.mapping.scale),
             renders_torque: false,
         }
     }

@@ -10,6 +10,7 @@ use std::time::Duration;
 use serialport::{ClearBuffer, SerialPort};
 use taut_spidar::{Geometry, PerString, Reading, STRINGS, StringFault, StringHardware};
 
+use super::converter::{digit, digits_per_newton};
 use super::counters::Counters;
 use super::cycle::{BrokenCycle, Cycle};
 use super::packet::{BoardInfo, INFO, INFO_ANSWER, INFO_PADDING, MAX_BOARDS, header};
@@ -41,11 +42,9 @@ const COUNTS_WITHIN: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_millis(1);
 /// Cycles of zero currents at an end, in case one is lost.
 const LAST_CYCLES: u32 = 3;
-/// Digits per volt of the boards' converter, and its largest.
-const DIGITS: (f64, f64) = (4096.0 / 3.3, 4095.0);
 
 /// Why there are no boards.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BoardsError {
     /// The port cannot be opened.
     #[error(
@@ -80,6 +79,18 @@ pub enum BoardsError {
         "the geometry {0} has no `volts_per_newton`, without which no current is known; write it into its file"
     )]
     NoVolts(String),
+    /// The converters have no range for these motors.
+    #[error(
+        "the least tension of the geometry {name} is {least} N, but the converters of motor boards reach {most:.2} N with its `volts_per_newton`; correct its file"
+    )]
+    OutOfRange {
+        /// The geometry's.
+        name: String,
+        /// As given, N.
+        least: f64,
+        /// N.
+        most: f64,
+    },
     /// No thread.
     #[error(
         "cannot start a thread for the motor boards: {0}; end other programs or raise the limit"
@@ -145,19 +156,6 @@ impl SpidarBoards {
             seen: (0, Duration::ZERO),
         })
     }
-}
-
-/// Digits of a board's converter per newton of a string's tension, with the sign of its winding.
-pub(crate) fn digits_per_newton(geometry: &Geometry) -> Result<PerString, BoardsError> {
-    let volts = geometry.volts(&[1.0; STRINGS]);
-    let volts = volts.ok_or_else(|| BoardsError::NoVolts(geometry.name.clone()))?;
-    Ok(volts.map(|volts| volts * DIGITS.0))
-}
-
-/// The digit that a tension is; zero where it is no number.
-pub(crate) fn digit(tension: f64, per_newton: f64) -> i16 {
-    // Within 16 bits, and zero for NaN.
-    (tension * per_newton).round().clamp(-DIGITS.1, DIGITS.1) as i16
 }
 
 impl StringHardware for SpidarBoards {

@@ -5,6 +5,7 @@
 //! | `packet.rs`    | bytes of the commands and their answers                                       |
 //! | `cycle.rs`     | the boards of a line: what a cycle sends, what it must be answered            |
 //! | `counters.rs`  | from counters of 16 bits that wrap to counts that may be believed             |
+//! | `converter.rs` | from tensions to the digits of the boards' converters, and how far these reach |
 //! | `boards.rs`    | the thread on the serial port: [`SpidarBoards`], a `StringHardware`           |
 //! | `simulated.rs` | the boards' side, with strings and hand, byte by byte                         |
 //!
@@ -12,12 +13,14 @@
 //! how fast they answer, what they do with a broken packet, and whether they let go of a current by themselves are not known.
 
 mod boards;
+mod converter;
 mod counters;
 mod cycle;
 mod packet;
 mod simulated;
 
 pub use boards::{BoardsError, SpidarBoards};
+pub(crate) use converter::within_range;
 pub use counters::Counters;
 pub use cycle::{BrokenCycle, Cycle};
 pub use packet::BoardInfo;

@@ -141,6 +141,64 @@ fn the_operators_token_travels_with_the_server_alone() {
     assert!(left.iter().all(|file| !file.ends_with("operator.token")));
 }
 
+/// The old key is called as `taut setup` proposed, and counts beside the new one for a while.
+#[test]
+fn an_old_cluster_key_is_not_written_over_the_new_one() {
+    let place = prepared();
+    let (old, new) = (place.path("cluster.key"), place.text("new.key"));
+    assert!(taut(&["keys", "--out", &new]).status.success());
+    let deployed = |also: &str| {
+        let mut table: Table = workbench().parse().expect("a workbench");
+        let network = table["network"].as_table_mut().expect("a table");
+        network.insert("also_key".to_owned(), also.into());
+        let until = "2100-01-01T00:00:00Z";
+        network.insert("also_key_until".to_owned(), until.into());
+        place.write("workbench.toml", &table.to_string());
+        let (config, out) = (place.text("workbench.toml"), place.text("out"));
+        let output = taut(&["deploy", &config, "--master", &new, "--out", &out]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), said)
+    };
+    let (code, said) = deployed("cluster.key");
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("cluster.key"), "{said}");
+    assert!(!place.path("out").exists());
+    fs::rename(&old, place.path("old.key")).expect("renamed");
+    let (code, said) = deployed("old.key");
+    assert_eq!(code, Some(0), "{said}");
+    let etc = unpacked(&place, "haptic-pc").join("etc");
+    for (there, wanted) in [("cluster.key", "new.key"), ("old.key", "old.key")] {
+        let carried = secret_of(&etc.join(there));
+        assert_eq!(carried, secret_of(&place.path(wanted)), "{there}");
+    }
+}
+
+/// The haptic PC draws nothing, so that its script knows no account that does.
+#[test]
+fn a_token_called_as_a_credential_of_a_screen_is_the_service_s() {
+    let place = prepared();
+    let name = "render-lab.token";
+    let operator = format!("[operator]\nenabled = true\ntoken_file = \"{name}\"\n");
+    let text = format!("{}\n{operator}", without_operator());
+    place.write("workbench.toml", &text);
+    place.write(name, &"0123456789abcdef".repeat(4));
+    let own = fs::Permissions::from_mode(0o600);
+    fs::set_permissions(place.path(name), own).expect("its mode");
+    let (code, said) = deploy(&place, &[]);
+    assert_eq!(code, Some(0), "{said}");
+    let folder = unpacked(&place, "haptic-pc");
+    let script = |name: &str| fs::read_to_string(folder.join(name)).expect("a script");
+    let line = format!("install -D -m 0600 -o taut -g taut etc/{name} /etc/taut/{name}");
+    let install = script("install");
+    assert!(install.lines().any(|there| there == line), "{install}");
+    let scripts = install + &script("uninstall");
+    assert!(!scripts.contains("$account"), "{scripts}");
+    // Where one draws, its credential is still that account's.
+    let install = fs::read_to_string(unpacked(&place, "left").join("install"));
+    let own = "-o \"$account\" etc/render-front.key";
+    assert!(install.expect("a script").contains(own));
+}
+
 fn without_operator() -> String {
     let mut table: Table = workbench().parse().expect("a workbench");
     table.remove("operator");

@@ -81,18 +81,14 @@ impl Plan<'_> {
     /// The archive of one machine, and in a few words what it holds.
     fn archive(&self, machine: &Machine) -> Result<(Vec<u8>, String), Failure> {
         let mut files = self.secrets(machine)?;
-        if machine.server {
-            files.extend(self.configuration()?);
-        }
-        for file in self.screen_files(machine)? {
-            if files.iter().all(|known| known.path != file.path) {
-                files.push(file);
-            }
-        }
-        let units = units(self.workbench, machine, self.address)?;
         let firewall = firewall::rules(self.workbench, machine);
         let has_firewall = firewall.is_some();
         files.extend(firewall.map(|rules| File::new("etc/firewall.nft", Mode::Plain, rules)));
+        if machine.server {
+            add(&mut files, self.configuration()?)?;
+        }
+        add(&mut files, self.screen_files(machine)?)?;
+        let units = units(self.workbench, machine, self.address)?;
         let scripts = Scripts {
             workbench: &self.workbench.name,
             machine,
@@ -236,6 +232,24 @@ impl Plan<'_> {
         }
         Ok(())
     }
+}
+
+/// Adds what the workbench file names, each file once: one with the name of another would be written over it when the archive is unpacked.
+fn add(files: &mut Vec<File>, named: Vec<File>) -> Result<(), Failure> {
+    for file in named {
+        match files.iter().find(|known| known.path == file.path) {
+            None => files.push(file),
+            Some(known) if *known.content == *file.content => {}
+            Some(_) => {
+                let name = file.path.strip_prefix("etc").unwrap_or(&file.path);
+                return Err(Failure::BadInput(format!(
+                    "the archive calls another file {0}; give the {0} beside the workbench file another name, and write that in the workbench file",
+                    name.display()
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Where a file is below the workbench file's folder, which is where it will be below /etc/taut.

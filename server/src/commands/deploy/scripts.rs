@@ -7,6 +7,7 @@ use taut_scene::{Machine, shell_word};
 
 use super::archive::{File, Mode};
 use super::units::Unit;
+use crate::commands::keys::file_name;
 
 /// What is to be done on one machine.
 pub(super) struct Scripts<'p> {
@@ -42,8 +43,17 @@ impl Scripts<'_> {
 
     /// The session's credential on the machine: its owner is the account that draws.
     fn key_of_session(&self) -> Option<String> {
-        let mut keys = self.files.iter().filter(|file| is_of_session(&file.path));
-        keys.next().map(installed)
+        let mut files = self.files.iter();
+        files.find(|file| self.is_of_session(file)).map(installed)
+    }
+
+    /// A render node's credential is read by the account that draws, everything else by `taut`.
+    fn is_of_session(&self, file: &File) -> bool {
+        let mut nodes = self.machine.nodes.iter();
+        nodes.any(|node| {
+            let key = format!("etc/render-{}.key", file_name(node));
+            file.path == Path::new(&key)
+        })
     }
 
     /// Sets the machine up; a second time does no harm.
@@ -79,7 +89,7 @@ impl Scripts<'_> {
         }
         text.push_str("\n# Configuration; a secret belongs to the account that reads it.\ninstall -d -m 0755 /etc/taut\ninstall -m 0755 uninstall /etc/taut/uninstall\n");
         for file in self.files {
-            let owner = match (file.mode, is_of_session(&file.path)) {
+            let owner = match (file.mode, self.is_of_session(file)) {
                 (Mode::Secret, true) => " -o \"$account\"",
                 (Mode::Secret, false) => " -o taut -g taut",
                 _ => "",
@@ -172,11 +182,4 @@ impl Scripts<'_> {
 fn installed(file: &File) -> String {
     let path = file.path.strip_prefix("etc").unwrap_or(&file.path);
     shell_word(&format!("/etc/taut/{}", path.display()))
-}
-
-/// A render node's credential is read by the account that draws, everything else by `taut`.
-fn is_of_session(path: &Path) -> bool {
-    path.file_name()
-        .and_then(|name| name.to_str())
-        .is_some_and(|name| name.starts_with("render-"))
 }

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 
 use taut_bridge::{DeviceChoice, InputChoice};
+use taut_kinds::read_choice;
 use taut_scene::{Device, Machine, TransportKind, Workbench};
 
 use crate::commands::arguments::HeadFrom;
@@ -170,8 +171,16 @@ fn reached_by(device: &str, machine: &Machine) -> Result<Vec<String>, Failure> {
 
 /// What the unit of the bridge must be allowed, so that it reaches this device; or why a service cannot have it.
 pub(in crate::commands) fn reached_by_a_service(device: &str) -> Result<Vec<String>, String> {
-    let choice = device.parse::<DeviceChoice>();
-    allowed(&choice.map_err(|error| error.to_string())?)
+    let chosen = read_choice(device).map_err(|error| error.to_string())?;
+    let choice = DeviceChoice::of(&chosen).map_err(|error| error.to_string())?;
+    let lines = choice.as_ref().map_or(Ok(Vec::new()), allowed)?;
+    match chosen.files().find(|file| !file.is_absolute()) {
+        Some(file) => Err(format!(
+            "a service finds a file by its whole path; begin {} with /",
+            file.display()
+        )),
+        None => Ok(lines),
+    }
 }
 
 /// What the unit must be allowed for this device.
@@ -185,9 +194,6 @@ fn allowed(choice: &DeviceChoice) -> Result<Vec<String>, String> {
     let lines: &[&str] = match choice {
         DeviceChoice::Mouse => {
             return Err("that is a render window's; run `taut render --hold` there by hand".into());
-        }
-        DeviceChoice::Trace(path) if !path.is_absolute() => {
-            return Err("a service finds a file by its whole path; begin it with /".into());
         }
         DeviceChoice::Input(InputChoice::Spidar(settings)) => {
             return Ok(on_serial(&settings.path));
@@ -233,6 +239,24 @@ mod tests {
             ("a\"$b", "\"a\\\"$$b\""),
         ] {
             assert_eq!(quoted(word), text);
+        }
+    }
+
+    #[test]
+    fn a_device_s_files_are_named_by_their_whole_paths() {
+        for (device, is_whole) in [
+            ("trace:hand.csv", false),
+            ("trace:/srv/hand.csv", true),
+            ("simulated,strings=my.toml", false),
+            ("simulated,strings=/srv/my.toml", true),
+            ("simulated,strings=wb", true),
+            ("spidar:ttyUSB0", false),
+            ("spidar:/dev/ttyUSB0", true),
+        ] {
+            let reached = reached_by_a_service(device);
+            assert_eq!(reached.is_ok(), is_whole, "{device}: {reached:?}");
+            let why = reached.err().unwrap_or_default();
+            assert!(is_whole || why.contains("whole path"), "{device}: {why}");
         }
     }
 }

@@ -151,10 +151,10 @@ pub(super) fn dynamics_of(
     let scene_hand = built.hand.as_ref().map(|hand| hand.preset);
     match choice {
         Some(choice) => {
-            let by_driver = of_input(choice, built.view.display_scale, scene_hand);
             // What the file declares is of the file's device.
             let in_file = workbench.dynamics.filter(|_| overrides.input.is_none());
-            Ok(by_driver.map(|(dynamics, torque)| (in_file.unwrap_or(dynamics), torque)))
+            let scale = built.view.display_scale;
+            Ok(of_input(choice, in_file, scale, scene_hand))
         }
         None => Ok(
             declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)?

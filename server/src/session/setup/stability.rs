@@ -66,19 +66,19 @@ pub(super) fn declared(
     }
 }
 
-/// What a device of the command line is declared to be in the scene's metres, and whether it renders torque; `None` without motors. A hand is
-/// taken as it is: its stiffness per metre of the scene is not known.
+/// What a device that a driver opens is in the scene's metres, and whether it renders torque; `None` without motors. What the workbench file declares
+/// of it (`in_file`) is in the device's own metres, and goes before what the driver assumes. A hand is taken as it is: its stiffness per metre of the
+/// scene is not known.
 pub(super) fn of_input(
     choice: &InputChoice,
+    in_file: Option<DeviceDynamics>,
     display_scale: f64,
     scene_hand: Option<HandPreset>,
 ) -> Option<(DeviceDynamics, bool)> {
     let device = choice.force_device()?;
-    // The same force over another way.
-    let shorter = display_scale / device.scale;
-    let dynamics = DeviceDynamics {
-        mass: device.grip.mass * shorter,
-        damping: device.grip.damping.min() * shorter,
+    let own = in_file.unwrap_or_else(|| DeviceDynamics {
+        mass: device.grip.mass,
+        damping: device.grip.damping.min(),
         friction: device.grip.coulomb_force.min(),
         resolution: 0.0,
         inertia: device.grip.rotational_inertia,
@@ -88,6 +88,14 @@ pub(super) fn of_input(
         delay: device.delay_s,
         motor_lag: 0.0,
         hand: scene_hand.unwrap_or_default(),
+    });
+    // The same force over another way.
+    let shorter = device.scale.map_or(1.0, |scale| display_scale / scale);
+    let dynamics = DeviceDynamics {
+        mass: own.mass * shorter,
+        damping: own.damping * shorter,
+        resolution: own.resolution / shorter,
+        ..own
     };
     Some((dynamics, device.renders_torque))
 }
@@ -251,6 +259,14 @@ mod tests {
             .expect("a simulated device is known")
     }
 
+    /// A device that is opened, as the command line has it.
+    fn input(text: &str) -> InputChoice {
+        match text.parse::<taut_bridge::DeviceChoice>() {
+            Ok(taut_bridge::DeviceChoice::Input(input)) => input,
+            other => panic!("{text}: {other:?}"),
+        }
+    }
+
     #[test]
     fn the_shipped_scene_suits_the_simulated_device() {
         let scene = scene();
@@ -290,12 +306,9 @@ mod tests {
     #[test]
     fn an_arm_without_torque_is_judged_by_its_force_in_the_scene_s_metres() {
         let scene = scene();
-        let arm: taut_bridge::DeviceChoice = "haply".parse().expect("a driver");
-        let taut_bridge::DeviceChoice::Input(arm) = arm else {
-            panic!("it is opened");
-        };
+        let arm = input("haply");
         let judged = |display_scale: f64, stiffness: f64| {
-            let (dynamics, torque) = of_input(&arm, display_scale, None).expect("motors");
+            let (dynamics, torque) = of_input(&arm, None, display_scale, None).expect("motors");
             assert!(!torque);
             let settings = Settings {
                 k_h: stiffness / (scene.settings.k_s * scene.world.body.mass),
@@ -309,6 +322,34 @@ mod tests {
         // Drawn three times as large, a hand moves three times as far for the same force.
         assert_eq!(judged(3.0, 1000.0).map(|w| w.len()), Ok(0));
         assert!(judged(1.0, 50_000.0).is_err());
+    }
+
+    #[test]
+    fn what_the_file_declares_of_an_arm_is_in_the_arm_s_own_metres() {
+        let declared = DeviceDynamics {
+            resolution: 3e-5,
+            ..light()
+        };
+        let arm = input("haply,scale=2");
+        let (dynamics, _) = of_input(&arm, Some(declared), 6.0, None).expect("motors");
+        // A metre of the scene is three of the arm.
+        for (found, own) in [
+            (dynamics.mass, declared.mass * 3.0),
+            (dynamics.damping, declared.damping * 3.0),
+            (dynamics.resolution, declared.resolution / 3.0),
+            (dynamics.inertia, declared.inertia),
+            (dynamics.friction, declared.friction),
+        ] {
+            assert!((found - own).abs() <= 1e-12 * own, "{found} {own}");
+        }
+    }
+
+    #[test]
+    fn strings_bear_the_same_however_large_the_scene_is_drawn() {
+        let strings = input("spidar:/dev/ttyUSB0");
+        let drawn = |display_scale| of_input(&strings, None, display_scale, None);
+        assert!(drawn(1.0).is_some());
+        assert_eq!(drawn(5.0), drawn(1.0));
     }
 
     #[test]
