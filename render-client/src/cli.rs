@@ -13,6 +13,7 @@ use crate::canvas::Canvas;
 use crate::description::Overrides;
 use crate::error::RenderError;
 use crate::hand::Hand;
+use crate::hold::Hold;
 use crate::membership::MembershipArgs;
 use crate::renderer::{Gpu, GpuChoice, SMOOTH};
 use crate::session::Session;
@@ -328,7 +329,7 @@ fn hand(args: &RenderArgs, stage: &Stage) -> Result<Option<Hand>, RenderError> {
             value: format!("given with the screen \"{}\"", screen.name),
         });
     }
-    Hand::join(args, stage).map(Some)
+    Hand::join(args, Hold::new(stage)).map(Some)
 }
 
 /// Tells the server what was measured, leaves it, and says it to the user.

@@ -58,12 +58,35 @@ pub struct Hold {
 impl Hold {
     /// Holds the stage's body at its start.
     pub fn new(stage: &Stage) -> Self {
+        Self::at(
+            stage.god_object.pose,
+            stage.reference_point,
+            stage.workbench_from_scene,
+        )
+    }
+
+    /// Holds a body at its start, world from body; its reference point is in its own frame.
+    pub fn at(
+        start: Isometry3<f64>,
+        reference_point: Point3<f64>,
+        workbench_from_world: Similarity3<f64>,
+    ) -> Self {
         Self {
-            start: stage.god_object.pose,
-            target: stage.god_object.pose,
-            reference_point: stage.reference_point,
-            workbench_from_world: stage.workbench_from_scene,
+            start,
+            target: start,
+            reference_point,
+            workbench_from_world,
             is_held: true,
+        }
+    }
+
+    /// Holds the body of another scene, at its start; lets go of it if it had let go. Where the body begins as before, the scene was
+    /// edited, and the device stays where it is.
+    pub fn follow(&mut self, other: Self) {
+        let place = |hold: &Self| (hold.start, hold.reference_point, hold.workbench_from_world);
+        if place(self) != place(&other) {
+            let is_held = self.is_held;
+            *self = Self { is_held, ..other };
         }
     }
 
@@ -174,13 +197,8 @@ mod tests {
     fn hold() -> Hold {
         let origin = Isometry3::new(Vector3::new(0.0, -0.45, 0.25), Vector3::z() * 0.4);
         let start = Isometry3::new(Vector3::new(0.0, 0.0, 0.1), Vector3::x() * 0.3);
-        Hold {
-            start,
-            target: start,
-            reference_point: Point3::new(0.01, -0.02, 0.03),
-            workbench_from_world: Similarity3::from_isometry(origin, 2.5),
-            is_held: true,
-        }
+        let workbench_from_world = Similarity3::from_isometry(origin, 2.5);
+        Hold::at(start, Point3::new(0.01, -0.02, 0.03), workbench_from_world)
     }
 
     fn eye() -> Point3<f64> {
@@ -284,6 +302,24 @@ mod tests {
         assert!(hold.is_held() && *hold.target() != god_object);
         hold.reset();
         assert_eq!(*hold.target(), hold.start);
+    }
+
+    #[test]
+    fn another_scene_s_body_is_held_at_its_start_an_edited_one_s_as_before() {
+        let mut hold = hold();
+        let begun = hold;
+        let (from, to) = (place(0.5, 0.5), place(0.6, 0.5));
+        hold.drag(Drag::Along, &screen(), &eye(), from, to);
+        let dragged = hold;
+        hold.follow(begun);
+        assert_eq!(hold, dragged);
+        let start = Isometry3::translation(0.0, 0.0, 0.2);
+        let other = Hold::at(start, Point3::origin(), Similarity3::identity());
+        hold.follow(other);
+        assert_eq!(hold, other);
+        hold.toggle(&start);
+        hold.follow(begun);
+        assert!(!hold.is_held() && *hold.target() == begun.start);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Which monitor each window covers.
 
+use std::collections::HashMap;
+
 use crate::error::RenderError;
 
 /// The place, among the monitors there are, of window number `window`; `None` leaves it to the window system.
@@ -16,6 +18,21 @@ pub(crate) fn of_window(
     };
     let place = place_of(&wanted[window.min(last)], known)? + window.saturating_sub(last);
     Ok((place < known.len()).then_some(place))
+}
+
+/// Windows that cover nothing stand in columns, one on each monitor, the first above.
+#[derive(Debug, Default)]
+pub(crate) struct Columns(HashMap<Option<usize>, u32>);
+
+impl Columns {
+    /// How far below the upper edge of its monitor the next window begins, which is `height` high, both in pixels. `None`: the monitor that
+    /// the window system takes where none is named.
+    pub(crate) fn next(&mut self, monitor: Option<usize>, height: u32) -> u32 {
+        let end = self.0.entry(monitor).or_default();
+        let begin = *end;
+        *end = begin.saturating_add(height);
+        begin
+    }
 }
 
 fn place_of(wanted: &str, known: &[Option<String>]) -> Result<usize, RenderError> {
@@ -61,6 +78,13 @@ mod tests {
         assert_eq!(place(1, &["2", "eDP-1"]).expect("known"), Some(0));
         assert_eq!(place(1, &[]).expect("in order"), Some(1));
         assert_eq!(place(5, &[]).expect("none is left"), None);
+    }
+
+    #[test]
+    fn the_first_window_of_each_monitor_begins_at_its_upper_edge() {
+        let mut columns = Columns::default();
+        let begins = [Some(1), Some(2), Some(1), None, None].map(|on| columns.next(on, 1080));
+        assert_eq!(begins, [0, 0, 1080, 0, 1080]);
     }
 
     #[test]

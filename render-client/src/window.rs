@@ -255,6 +255,10 @@ impl App<'_> {
         };
         let same = windows(&stage) == windows(&self.stage);
         self.stage = stage;
+        self.god_object = self.stage.god_object.pose;
+        if let Some(hand) = &mut self.hand {
+            hand.follow(&self.stage, self.mouse.buttons());
+        }
         match &mut self.screen {
             Some(screen) if same => screen.restage(&self.stage),
             _ => {

@@ -9,7 +9,7 @@ use crate::support::{canvas, peg_in_hole, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Vector3};
 use taut_render::canvas::Canvas;
-use taut_render::renderer::{Gpu, shapes};
+use taut_render::renderer::{Gpu, OffScreen, shapes};
 use taut_render::stage::{Stage, StageBody, StageScreen, TriangleMesh};
 use taut_render::timeline::{Contact, Latched};
 use taut_render::view::{ClipPlanes, Eye, Eyes, project};
@@ -34,6 +34,25 @@ fn draw(stage: Stage, latched: &Latched, show: Show) -> Option<Vec<RgbaImage>> {
     canvas.draw(latched, show, true).expect("drawn");
     let images = canvas.images().expect("read back");
     Some(images.into_iter().map(|(_, image)| image).collect())
+}
+
+/// 257 MiB: wgpu gives a buffer no more than 256 unless it is asked to, and the program broke down.
+#[test]
+fn a_picture_that_is_read_back_may_be_larger_than_256_mib() {
+    let gpu = match Gpu::open() {
+        Ok(gpu) => gpu,
+        Err(error) => return taut_test_kit::left_out(error),
+    };
+    let (width, height) = (8192, 8224);
+    let most = gpu.adapter.limits();
+    let bytes = u64::from(4 * width * height);
+    if most.max_texture_dimension_2d < height || most.max_buffer_size < bytes {
+        return taut_test_kit::left_out("the adapter has no picture of 257 MiB");
+    }
+    assert_eq!(
+        OffScreen::new(&gpu, (width, height)).size(),
+        (width, height)
+    );
 }
 
 /// Far more red than blue: the god-object and nothing else.

@@ -126,10 +126,15 @@ impl Gpu {
         let others: Vec<AdapterSummary> = others.map(|(_, summary)| summary).collect();
         let adapter = adapters.swap_remove(place);
 
+        let most = adapter.limits();
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("taut-render"),
             required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
-            required_limits: wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits()),
+            required_limits: wgpu::Limits {
+                // Large pictures that are read back and large meshes take more than the 256 MiB that all adapters have.
+                max_buffer_size: most.max_buffer_size,
+                ..wgpu::Limits::downlevel_defaults().using_resolution(most)
+            },
             ..Default::default()
         };
         let (device, queue) =

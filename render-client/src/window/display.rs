@@ -58,23 +58,24 @@ impl Display {
         let monitors: Vec<MonitorHandle> = events.available_monitors().collect();
         let names: Vec<Option<String>> = monitors.iter().map(MonitorHandle::name).collect();
         let mut opened = Vec::new();
-        let mut below = 0;
+        let mut columns = monitor::Columns::default();
         for (index, screen) in stage.screens.iter().enumerate() {
             for (eye, picture) in Picture::of(screen.stereo).into_iter().enumerate() {
                 let (width, height) = screen.pixels;
-                // On one monitor the windows stand in a column, the first screen above.
                 let place = monitor::of_window(opened.len(), &plan.monitors, &names)?;
                 let monitor = place.and_then(|place| monitors.get(place).cloned());
                 // A monitor that was asked for is where the window opens, even if it does not cover it.
-                let named = monitor.as_ref().filter(|_| !plan.monitors.is_empty());
-                let corner = named.map_or(PhysicalPosition::new(0, 0), MonitorHandle::position);
+                let named = place.filter(|_| !plan.monitors.is_empty());
+                let corner = named
+                    .and_then(|place| monitors.get(place))
+                    .map_or(PhysicalPosition::new(0, 0), MonitorHandle::position);
+                let below = columns.next(named, height);
                 let cover = || Fullscreen::Borderless(monitor.clone());
                 let attributes = Window::default_attributes()
                     .with_title(format!("taut: {}{}{help}", screen.name, picture.suffix))
                     .with_inner_size(PhysicalSize::new(width, height))
                     .with_position(PhysicalPosition::new(corner.x, corner.y + below as i32))
                     .with_fullscreen(plan.fullscreen.then(cover));
-                below += height;
                 let window = events
                     .create_window(attributes)
                     .map_err(|error| missing(&error))?;

@@ -77,7 +77,7 @@ where
     fn call(&mut self, request: Request<B>) -> Self::Future {
         if self.guard.lets_through(&request) {
             if let Some(place) = request.extensions().get::<Place>() {
-                place.leave();
+                place.settle();
             }
             return Either::Left(self.inner.call(request));
         }

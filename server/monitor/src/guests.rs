@@ -1,7 +1,8 @@
-//! Connections to both ports. Who has asked for nothing yet has one of a bounded number of places, as at the observers' port.
+//! Connections to both ports. Who has asked for nothing yet has one of a bounded number of places, as at the observers' port; whoever has asked
+//! has one of another number, however long a viewer stays, answers pings or takes nothing.
 
 use std::io;
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll};
@@ -13,26 +14,48 @@ use tokio::net::TcpStream;
 use tokio::time::{Sleep, sleep};
 use tonic::transport::server::{Connected, TcpIncoming};
 
+/// Connections to a port that have asked: as many as observers by default.
+const MAX_GUESTS: usize = 128;
+/// The same of one address, as behind a tunnel.
+const MAX_GUESTS_OF_ONE: usize = 64;
+
 /// Those who come to a port. Call and poll it within the runtime.
 pub(crate) fn incoming(socket: TcpListener) -> io::Result<impl Stream<Item = io::Result<Guest>>> {
     let listener = tokio::net::TcpListener::from_std(socket)?;
     let connections = TcpIncoming::from(listener).with_nodelay(Some(true));
     let entrance = Entrance::default();
-    Ok(connections.map(move |connection| Guest::new(connection?, &entrance)))
+    let guests = Entrance::of(MAX_GUESTS, MAX_GUESTS_OF_ONE);
+    Ok(connections.map(move |connection| Guest::new(connection?, &entrance, &guests)))
 }
 
 /// The place of a connection, which its requests know as well.
 #[derive(Clone)]
-pub(crate) struct Place(Arc<Mutex<Option<Asking>>>);
+pub(crate) struct Place {
+    held: Arc<Mutex<Held>>,
+    guests: Entrance,
+    peer: SocketAddr,
+}
+
+struct Held {
+    place: Asking,
+    has_asked: bool,
+}
 
 impl Place {
-    /// It has asked for what it may have: others may have the place, and its time to ask is over no more.
-    pub(crate) fn leave(&self) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    /// It has asked for what it may have: others may have the place that it asked from, it has one among the guests, and its time to ask is over
+    /// no more.
+    pub(crate) fn settle(&self) {
+        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        if !held.has_asked {
+            *held = Held {
+                place: self.guests.ask(self.peer),
+                has_asked: true,
+            };
+        }
     }
 }
 
-/// A connection, which ends where it asks for nothing and its time or its place is gone.
+/// A connection, which ends where its place is gone, and where it asks for nothing in time.
 pub(crate) struct Guest {
     stream: TcpStream,
     place: Place,
@@ -41,27 +64,40 @@ pub(crate) struct Guest {
 }
 
 impl Guest {
-    fn new(stream: TcpStream, entrance: &Entrance) -> io::Result<Self> {
-        let asking = entrance.ask(stream.peer_addr()?);
+    fn new(stream: TcpStream, entrance: &Entrance, guests: &Entrance) -> io::Result<Self> {
+        let peer = stream.peer_addr()?;
+        let held = Held {
+            place: entrance.ask(peer),
+            has_asked: false,
+        };
         Ok(Self {
             stream,
-            place: Place(Arc::new(Mutex::new(Some(asking)))),
+            place: Place {
+                held: Arc::new(Mutex::new(held)),
+                guests: guests.clone(),
+                peer,
+            },
             patience: Box::pin(sleep(REQUEST_TIME)),
             is_given_up: false,
         })
     }
 
-    /// Whether nothing is heard of it any more.
-    fn is_given_up(&mut self, context: &mut Context<'_>) -> bool {
-        let mut place = self.place.0.lock().unwrap_or_else(PoisonError::into_inner);
+    /// An error if it is given up. Whoever takes nothing is not read from either: so this is asked by both ways.
+    fn check(&mut self, context: &mut Context<'_>) -> io::Result<()> {
         // Looked at once only: what is done must not be asked again.
-        if let Some(asking) = place.as_mut()
-            && !self.is_given_up
-        {
-            self.is_given_up = Pin::new(&mut asking.lost).poll(context).is_ready()
-                || self.patience.as_mut().poll(context).is_ready();
+        if !self.is_given_up {
+            let held = &mut *self
+                .place
+                .held
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            let is_late = !held.has_asked && self.patience.as_mut().poll(context).is_ready();
+            self.is_given_up = is_late || Pin::new(&mut held.place.lost).poll(context).is_ready();
         }
-        self.is_given_up
+        match self.is_given_up {
+            true => Err(io::ErrorKind::TimedOut.into()),
+            false => Ok(()),
+        }
     }
 }
 
@@ -79,9 +115,7 @@ impl AsyncRead for Guest {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        if self.is_given_up(context) {
-            return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
-        }
+        self.check(context)?;
         Pin::new(&mut self.stream).poll_read(context, buffer)
     }
 }
@@ -92,6 +126,7 @@ impl AsyncWrite for Guest {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
+        self.check(context)?;
         Pin::new(&mut self.stream).poll_write(context, bytes)
     }
 
@@ -100,6 +135,7 @@ impl AsyncWrite for Guest {
         context: &mut Context<'_>,
         slices: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
+        self.check(context)?;
         Pin::new(&mut self.stream).poll_write_vectored(context, slices)
     }
 
@@ -108,6 +144,7 @@ impl AsyncWrite for Guest {
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        self.check(context)?;
         Pin::new(&mut self.stream).poll_flush(context)
     }
 

@@ -207,6 +207,75 @@ fn silent_connections_to_both_ports_lose_their_places_to_newcomers() {
     monitor.stop().unwrap();
 }
 
+/// Asks for what is not there, and leaves the connection open.
+fn ask(connection: &mut TcpStream, address: &str) {
+    connection
+        .set_read_timeout(Some(Duration::from_secs(20)))
+        .unwrap();
+    write!(
+        connection,
+        "GET /nothing HTTP/1.1\r\nHost: {address}\r\n\r\n"
+    )
+    .unwrap();
+    let mut answer = Vec::new();
+    while !answer.ends_with(b"\r\n\r\n") {
+        let mut byte = [0];
+        assert_eq!(connection.read(&mut byte).unwrap(), 1, "no answer");
+        answer.extend(byte);
+    }
+}
+
+/// Of those who have asked, 64 of one address.
+#[test]
+fn whoever_has_asked_makes_room_too_when_too_many_stay() {
+    let scene = MonitorScene::new("empty");
+    let (monitor, _sender) = Monitor::start(&on_free_ports(), scene).unwrap();
+    let page = host_of(monitor.address().unwrap()).to_owned();
+    let mut held: Vec<TcpStream> = Vec::new();
+    for _ in 0..64 + 4 {
+        let mut connection = TcpStream::connect(&page).unwrap();
+        ask(&mut connection, &page);
+        held.push(connection);
+    }
+    for connection in &mut held[..4] {
+        match connection.read(&mut [0; 16]) {
+            Ok(length) => assert_eq!(length, 0, "closed"),
+            Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
+        }
+    }
+    held[4..].iter_mut().for_each(|stays| ask(stays, &page));
+    monitor.stop().unwrap();
+}
+
+/// Who takes nothing of 42 MB makes room as well, even if there is more of him to read.
+#[test]
+fn a_reader_who_takes_nothing_makes_room_when_too_many_stay() {
+    let scene = MonitorScene::new("empty");
+    let (monitor, _sender) = Monitor::start(&on_free_ports(), scene).unwrap();
+    let page = host_of(monitor.address().unwrap()).to_owned();
+    let mut slow = TcpStream::connect(&page).unwrap();
+    let whole = format!("GET /re_viewer_bg.wasm HTTP/1.1\r\nHost: {page}\r\n\r\n");
+    slow.write_all(whole.repeat(2).as_bytes()).unwrap();
+    slow.set_read_timeout(Some(Duration::from_secs(20)))
+        .unwrap();
+    slow.read_exact(&mut [0; 16]).unwrap(); // it is being answered
+    let mut held: Vec<TcpStream> = Vec::new();
+    for _ in 0..64 {
+        let mut connection = TcpStream::connect(&page).unwrap();
+        ask(&mut connection, &page);
+        held.push(connection);
+    }
+    // What the system had taken for him already is less than the file.
+    let mut rest = Vec::new();
+    let ended = slow.read_to_end(&mut rest);
+    assert!(
+        ended.is_ok() || ended.is_err_and(|error| error.kind() == ErrorKind::ConnectionReset),
+        "it goes on"
+    );
+    assert!(rest.len() < 40_000_000, "{} bytes came", rest.len());
+    monitor.stop().unwrap();
+}
+
 #[test]
 fn an_occupied_port_is_an_error_that_names_port_and_key() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();

@@ -24,7 +24,7 @@ pub struct Entrance {
     crowded_out: Arc<AtomicU64>,
 }
 
-/// A place to ask from; dropped, it is free again. Whoever takes it ends `lost`.
+/// A place, to ask from or to stay at; dropped, it is free again. Whoever takes it ends `lost`.
 pub struct Asking {
     places: Places,
     ticket: Ticket,
@@ -34,14 +34,19 @@ pub struct Asking {
 
 impl Default for Entrance {
     fn default() -> Self {
-        Self {
-            places: Arc::new(Mutex::new(Waiting::new(MAX_ASKING, MAX_ASKING_OF_ONE))),
-            crowded_out: Arc::default(),
-        }
+        Self::of(MAX_ASKING, MAX_ASKING_OF_ONE)
     }
 }
 
 impl Entrance {
+    /// With so many places, `of_one` at most for one address.
+    pub fn of(places: usize, of_one: usize) -> Self {
+        Self {
+            places: Arc::new(Mutex::new(Waiting::new(places, of_one))),
+            crowded_out: Arc::default(),
+        }
+    }
+
     /// A place for `peer` to ask from, by [`REQUEST_TIME`]; whoever asks longest of the address that asks most gives it up where there is none.
     pub fn ask(&self, peer: SocketAddr) -> Asking {
         let (place, lost) = oneshot::channel();

@@ -19,7 +19,7 @@ use tokio::time::{sleep, timeout};
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
-use tokio_tungstenite::tungstenite::{Message, Utf8Bytes};
+use tokio_tungstenite::tungstenite::{Error, Message, Utf8Bytes};
 
 use crate::asking::{Asking, Entrance, REQUEST_TIME};
 use crate::event_lines::EventLines;
@@ -228,7 +228,11 @@ async fn observer(mut stream: TcpStream, shared: &Shared, mut asking: Asking) ->
                 "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {accept}\r\n\r\n"
             );
             send(stream.write_all(head.as_bytes())).await?;
-            let config = WebSocketConfig::default()
+            let config = WebSocketConfig::default();
+            // The longest line fits; the answers to pings of who takes none of them do not pile up.
+            let most = 2 * config.write_buffer_size + shared.hello.len();
+            let config = config
+                .max_write_buffer_size(most)
                 .max_message_size(Some(MAX_INBOUND_BYTES))
                 .max_frame_size(Some(MAX_INBOUND_BYTES));
             let socket = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
@@ -307,8 +311,8 @@ impl Carrier for WebSocketStream<TcpStream> {
     async fn line(&mut self, line: Utf8Bytes) -> Result<(), End> {
         let sending = SinkExt::send(self, Message::Text(line));
         match timeout(SEND_TIME, sending).await {
+            Ok(Err(Error::WriteBufferFull(_))) | Err(_) => Err(End::Slow),
             Ok(sent) => sent.map_err(|_| End::Gone),
-            Err(_) => Err(End::Slow),
         }
     }
 

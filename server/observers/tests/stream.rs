@@ -234,6 +234,29 @@ fn an_observer_that_does_not_read_is_dropped_and_others_do_not_notice() {
 }
 
 #[test]
+fn answers_to_pings_do_not_pile_up_for_who_takes_none() {
+    const PINGS: usize = 80_000;
+    // Lines come at the start alone: nothing else tells that the observer takes nothing.
+    let (_workbench, server) = serve(0.01, None, 4);
+    let asks = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+    let mut reader = get(&server, "/ws", asks);
+    assert_eq!(status(&mut reader), "HTTP/1.1 101 Switching Protocols");
+    let mut ping = vec![0x89_u8, 0x80 | 125]; // masked by nothing: zeros
+    ping.resize(2 + 4 + 125, 0);
+    let many = ping.repeat(1000);
+    for _ in 0..PINGS / 1000 {
+        reader.get_mut().write_all(&many).expect("it listens");
+    }
+    let close = [0x88_u8, 0x80, 0, 0, 0, 0];
+    reader.get_mut().write_all(&close).expect("it listens");
+    // What waited for the observer, in the server and on the way.
+    let mut came = Vec::new();
+    reader.read_to_end(&mut came).expect("the end");
+    let all = PINGS * (2 + 125);
+    assert!(came.len() < all / 2, "{} bytes of {all}", came.len());
+}
+
+#[test]
 fn garbage_and_too_many_are_sent_away() {
     let (_workbench, server) = serve(60.0, None, 2);
     let mut garbage = TcpStream::connect(server.address()).expect("the server");
