@@ -22,19 +22,27 @@ impl SceneWatch {
     /// Watches what was read just now.
     pub(super) fn new(config: &Path, workbench: &Workbench) -> Result<Self, Failure> {
         let mut paths = Vec::new();
+        let mut of_meshes = Vec::new();
         for file in workbench.needed_files()? {
             match file {
-                NeededFile::OfScene { scene, found, .. } if scene == workbench.scene => {
-                    paths.push(found)
+                NeededFile::OfScene {
+                    scene,
+                    found,
+                    by_mesh,
+                    ..
+                } if scene == workbench.scene => {
+                    of_meshes.extend(by_mesh.then(|| found.clone()));
+                    paths.push(found);
                 }
                 NeededFile::Named(path) if path == Path::new(&workbench.scene) => paths.push(path),
                 NeededFile::OfScene { .. } | NeededFile::Named(_) | NeededFile::Secret(_) => {}
             }
         }
         let mut watched = vec![config.to_path_buf()];
-        watched.extend(paths.iter().cloned());
+        let named = paths.iter().filter(|path| !of_meshes.contains(path));
+        watched.extend(named.cloned());
         Ok(Self {
-            files: FileWatch::new(watched),
+            files: FileWatch::new(watched).and_while_there(of_meshes),
             contents: contents(&workbench.scene, &paths),
             paths,
         })
@@ -134,22 +142,16 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_scene_that_is_written_while_it_is_read_makes_one_session_and_that_of_the_new_text() {
-        let place = tempfile::tempdir().expect("a directory");
+    /// A server in `place` that follows its `scene.toml`, which is there.
+    fn following(place: &Path) -> (Loader, SceneWatch) {
         let [config, key, scene] =
-            ["workbench.toml", "key", "scene.toml"].map(|name| place.path().join(name));
+            ["workbench.toml", "key", "scene.toml"].map(|name| place.join(name));
         let scene_name = scene.to_str().expect("a plain path");
         let workbench = SHIPPED_WORKBENCH.replace(
             "scene = \"peg-in-a-hole\"",
             &format!("scene = \"{scene_name}\""),
         );
         std::fs::write(&config, workbench).expect("written");
-        let write = |k_h: &str| {
-            let text = BALL_ON_FLOOR.replace("2000.0", k_h);
-            std::fs::write(&scene, text).expect("written");
-        };
-        write("2000.0");
         taut_link::create_key_file(&key).expect("a key");
         let words = ["serve".as_ref(), "--config".as_ref(), config.as_os_str()];
         let more = ["--key".as_ref(), key.as_os_str(), "--follow-scene".as_ref()];
@@ -158,12 +160,42 @@ mod tests {
             .args;
         let loader = Loader::new(args, Overrides::default());
         let mut first = loader.load().unwrap_or_else(|error| panic!("{error}"));
-        let mut watch = first.files.take().expect("it follows");
+        let watch = first.files.take().expect("it follows");
+        (loader, watch)
+    }
+
+    #[test]
+    fn a_scene_that_is_written_while_it_is_read_makes_one_session_and_that_of_the_new_text() {
+        let place = tempfile::tempdir().expect("a directory");
+        let write = |k_h: &str| {
+            let text = BALL_ON_FLOOR.replace("2000.0", k_h);
+            std::fs::write(place.path().join("scene.toml"), text).expect("written");
+        };
+        write("2000.0");
+        let (loader, mut watch) = following(place.path());
 
         write("2000.0"); // the same text, at a later time
         let none = followed(&mut watch, &loader, || write("1500.0"));
         assert!(none.is_none(), "a session of the old text");
         let next = followed(&mut watch, &loader, || ()).expect("the new one");
         assert!(next.in_file.contains("1500.0"), "{}", next.in_file);
+    }
+
+    #[test]
+    fn a_library_of_materials_that_is_gone_is_a_change_as_any() {
+        let place = tempfile::tempdir().expect("a directory");
+        let write = |name: &str, text: &str| {
+            std::fs::write(place.path().join(name), text).expect("written");
+        };
+        let seen = "[[scenery]]\nname = \"seen\"\nshape = { mesh = \"a.obj\" }\n";
+        write("scene.toml", &format!("{BALL_ON_FLOOR}{seen}"));
+        write(
+            "a.obj",
+            "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 0.03 0 0\nv 0 0.03 0\nv 0 0 0.03\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+        );
+        write("a.mtl", "newmtl m\nKd 1 0 0\n");
+        let (loader, mut watch) = following(place.path());
+        std::fs::remove_file(place.path().join("a.mtl")).expect("removed");
+        assert!(followed(&mut watch, &loader, || ()).is_some());
     }
 }
