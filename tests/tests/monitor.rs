@@ -112,6 +112,34 @@ fn a_recording_that_is_there_is_refused_or_the_next_is_beside_it() {
     assert_eq!(std::fs::read(path).expect("there"), b"precious");
 }
 
+/// So that the next start finds its name free.
+#[test]
+fn a_start_that_fails_leaves_no_recording() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.set("scene", "sphere-on-plane");
+    workbench.set("realtime.mode", "enforce");
+    // No system grants a core that is not there.
+    for key in ["realtime.haptics_core", "realtime.coupling_core"] {
+        workbench.set(key, 1000);
+    }
+    let path = workbench.directory().join("session.rrd");
+    let record = path.display().to_string();
+    let config = workbench.save().display().to_string();
+    let key = workbench.key_path();
+    let serve = ["serve", "--config", &config, "--key", &key];
+    let refused = workbench.run(
+        "refused",
+        &[&serve[..], &["--duration", "1", "--record", &record]].concat(),
+    );
+    assert_eq!(refused.status.code(), Some(2), "{}", refused.stderr);
+    assert!(
+        refused.stderr.contains("enforces real time"),
+        "{}",
+        refused.stderr
+    );
+    assert!(!path.exists());
+}
+
 /// A device that pushes and cannot turn: whoever looks on is told, and sees what the hand feels.
 #[test]
 fn a_device_without_torque_is_said_in_the_picture_and_its_torque_is_none() {

@@ -175,10 +175,12 @@ impl ArmDevice {
             let turning = self.hand() * (self.mapping.axes.matrix() * Vector3::from(measured));
             let turning = self.mapping.origin.rotation * turning;
             self.placement.rotation_in_world(&turning)
-        } else if is_first || passed <= 0.0 {
+        } else if is_first {
             Vector3::zeros()
-        } else {
+        } else if passed > 0.0 {
             before + (turned / passed - before) * (passed / (passed + TURN_LAG_S))
+        } else {
+            before // measured when the last one was, as where a driver says a measurement again
         };
         let moving =
             self.mapping.axes.matrix() * Vector3::from(state.velocity) * self.mapping.scale;
@@ -326,6 +328,25 @@ mod tests {
             Err(DeviceFault::Lost { age: ms(21) }),
             "since it was measured"
         );
+    }
+
+    #[test]
+    fn a_measurement_that_is_said_again_stops_no_turn() {
+        let (said, mut device) = arm();
+        let mut last = 0.0;
+        for time in 0..100_u64 {
+            // 2 rad/s, measured each 5 ms, and said each millisecond.
+            let half = 1e-3 * (time / 5 * 5) as f64;
+            *said.lock().expect("whole") = ArmState {
+                orientation: Some([half.cos(), 0.0, 0.0, half.sin()]),
+                ..state(1 + time, ms(time % 5))
+            };
+            let sample = device.read(ms(1000 + time)).expect("a sample");
+            let turning = sample.velocity.fixed_rows::<3>(3).norm();
+            assert!(turning >= last - 1e-9, "{turning} after {last} at {time}");
+            last = turning;
+        }
+        assert!((1.8..2.001).contains(&last), "{last} rad/s");
     }
 
     #[test]

@@ -137,6 +137,8 @@ pub(super) struct Arming {
     was_held: bool,
     /// Somebody asked for force on the way down, and has not taken it back.
     asked: bool,
+    /// The commands come by another way since.
+    asked_of_another: bool,
 }
 
 impl Arming {
@@ -155,6 +157,7 @@ impl Arming {
             commanded: None,
             was_held: false,
             asked: false,
+            asked_of_another: false,
         }
     }
 
@@ -180,7 +183,7 @@ impl Arming {
 
     /// The commands come by another way from now on: what there was is gone, and new ones ramp in from zero, if nobody has to be asked.
     pub(super) fn restart(&mut self, source: CommandSource) {
-        self.asked = false; // of whoever commanded before
+        self.asked_of_another |= self.asked;
         if self.state.is_off() || self.cause_lasts() {
             return;
         }
@@ -208,7 +211,7 @@ impl Arming {
     ) -> [Option<EventKind>; 2] {
         // A clock that goes back passes no time, and a stall of the caller lets no force in at once.
         let passed = now.saturating_sub(self.last.unwrap_or(now));
-        let stalled = passed > settings.hold;
+        let stalled = std::mem::take(&mut self.asked_of_another) || passed > settings.hold;
         let passed = passed.min(settings.hold);
         self.last = Some(self.last.map_or(now, |last| last.max(now)));
 
@@ -256,7 +259,8 @@ impl Arming {
     }
 
     /// What is asked on the way down waits for its end, where the force may come again from zero: who presses the dead-man's button again holds it by
-    /// then. Not longer: it is taken back by who lets go or disarms, and refused where a fault or a stall comes in between. Whether it is refused.
+    /// then. Not longer: it is taken back by who lets go or disarms, and refused where a fault, a stall or another who commands comes in between. Whether
+    /// it is refused.
     fn keep_request(&mut self, stalled: bool, situation: &Situation) -> bool {
         let asked = (self.asked || situation.asked) && !situation.disarm;
         let refused = stalled || situation.fault_since.is_some() || !situation.held;

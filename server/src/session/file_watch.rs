@@ -13,6 +13,8 @@ type FileVersion = Option<(SystemTime, u64)>;
 #[derive(Debug)]
 pub(crate) struct FileWatch {
     paths: Vec<PathBuf>,
+    /// So many of them, the first, are gone for a moment at most.
+    lasting: usize,
     looked: Instant,
     /// As of the last look.
     seen: Vec<FileVersion>,
@@ -26,11 +28,22 @@ impl FileWatch {
     pub(crate) fn new(paths: Vec<PathBuf>) -> Self {
         let versions = versions(&paths);
         Self {
+            lasting: paths.len(),
             paths,
             looked: Instant::now(),
             seen: versions.clone(),
             read: versions,
         }
+    }
+
+    /// These, too: that one of them is gone is a change as any.
+    #[must_use]
+    pub(crate) fn and_while_there(mut self, paths: Vec<PathBuf>) -> Self {
+        let versions = versions(&paths);
+        self.paths.extend(paths);
+        self.seen.extend_from_slice(&versions);
+        self.read.extend(versions);
+        self
     }
 
     /// Whether it is time for a look, and the look shows other files than those that were read.
@@ -45,7 +58,8 @@ impl FileWatch {
         let settled = now == self.seen;
         self.seen = now.clone();
         // Editors put a new file in the place of the old one: for a moment there is none.
-        let changed = now.iter().all(Option::is_some) && settled && now != self.read;
+        let are_there = now.iter().take(self.lasting).all(Option::is_some);
+        let changed = are_there && settled && now != self.read;
         if changed {
             self.read = now;
         }
@@ -87,5 +101,22 @@ mod tests {
         std::fs::write(&other, "ab").expect("written");
         assert!(!watch.has_changed());
         assert!(watch.has_changed());
+    }
+
+    #[test]
+    fn what_a_mesh_can_do_without_holds_up_no_other_change() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let [path, library] = ["scene.toml", "a.mtl"].map(|name| directory.path().join(name));
+        std::fs::write(&path, "a").expect("written");
+        std::fs::write(&library, "a").expect("written");
+        let mut watch = FileWatch::new(vec![path.clone()]).and_while_there(vec![library.clone()]);
+        assert!(!watch.has_changed());
+        std::fs::remove_file(&library).expect("removed");
+        assert!(!watch.has_changed());
+        assert!(watch.has_changed(), "it is gone");
+        assert!(!watch.has_changed(), "once");
+        std::fs::write(&path, "ab").expect("written");
+        assert!(!watch.has_changed());
+        assert!(watch.has_changed(), "the scene is followed all the same");
     }
 }

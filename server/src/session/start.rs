@@ -20,7 +20,9 @@ use crate::session::audit::AuditTrail;
 use crate::session::broadcast::{BridgeCommands, StateWriter};
 use crate::session::clients::ClientLedger;
 use crate::session::edge_sets::EdgeSets;
-use crate::session::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Severity};
+use crate::session::monitor::{
+    FreshRecording, MonitorFeed, MonitorPicture, MonitorSources, Severity,
+};
 use crate::session::observers::ObserverServices;
 use crate::session::operator::{Continuity, Facts, OperatorPage};
 use crate::session::setup::content::own_colours;
@@ -131,6 +133,7 @@ impl Session {
         let broadcaster = link.broadcaster();
         let (grant, awake) = keep_cores_awake();
         ledger.note("process", grant);
+        let mut fresh = FreshRecording::default(); // dropped after the session that writes it
         let mut session = Self {
             clock,
             started: clock.now(),
@@ -168,6 +171,7 @@ impl Session {
             };
             let network = session.network.clone();
             let feed = MonitorFeed::start(settings, &picture, sources, network, &session.shutdown)?;
+            fresh.made(feed.recording());
             session.monitor = Some(feed);
         }
         if setup.realtime.lock_memory {
@@ -204,6 +208,7 @@ impl Session {
         session.start_service_manager()?;
         session.enforce(setup.realtime.policy)?;
         session.log_start(&opening);
+        fresh.keep();
         Ok(session)
     }
 

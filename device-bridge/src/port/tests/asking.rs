@@ -86,3 +86,18 @@ fn what_is_asked_before_a_fault_or_a_stall_is_refused() {
         );
     }
 }
+
+#[test]
+fn what_is_asked_before_somebody_else_commands_is_refused() {
+    for source in [CommandSource::Same, CommandSource::Other] {
+        let mut stage = Stage::armed_by_a_person();
+        stage.port.ask_to_disarm();
+        stage.good_for(ms(30), force(10.0));
+        stage.port.ask_to_arm();
+        stage.good_for(ms(10), force(10.0));
+        stage.port.restart(source);
+        stage.good_for(ms(1500), force(10.0));
+        assert_eq!(stage.port.rendered(), &Vector6::zeros());
+        assert_eq!(stage.kinds(), [EventKind::Disarmed, EventKind::ArmRefused]);
+    }
+}

@@ -47,10 +47,13 @@ fn parse(text: &str, list: &mut [Material]) -> Vec<Remark> {
         let line = line.trim();
         let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         if key == "newmtl" {
-            // A name may hold a `#`, as `usemtl` has it.
-            current = list
-                .iter()
-                .position(|material| material.name == rest.trim());
+            let place = |name: &str| {
+                list.iter()
+                    .position(|material| material.name == name.trim())
+            };
+            // A name may hold a `#`, as `usemtl` has it, and a comment may stand behind one.
+            let bare = || rest.split_once(" # ").and_then(|(bare, _)| place(bare));
+            current = place(rest).or_else(bare);
             if let Some(place) = current {
                 list[place].is_defined = true;
             }
@@ -157,6 +160,15 @@ mod tests {
         assert_eq!(list[1].appearance.opacity, Some(0.5));
         let defined = list.map(|material| material.is_defined);
         assert_eq!(defined, [true, true, false]);
+    }
+
+    #[test]
+    fn a_comment_behind_a_name_is_none_of_it() {
+        let mut list = [named("Material")];
+        let text = "newmtl Material # the grey one\nKd 0\nnewmtl Material #25\nKd 1\n";
+        assert_eq!(parse(text, &mut list), []);
+        assert_eq!(list[0].appearance.color, Some([0.0; 3]));
+        assert!(list[0].is_defined);
     }
 
     #[test]

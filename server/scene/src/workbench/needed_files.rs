@@ -23,6 +23,8 @@ pub enum NeededFile {
         name: String,
         /// The file.
         found: PathBuf,
+        /// A mesh of the scene names it, and not the scene: a library of materials, without which the mesh is read all the same, or a buffer.
+        by_mesh: bool,
     },
 }
 
@@ -51,9 +53,15 @@ impl Workbench {
             if shipped_scene_text(scene).is_none() {
                 files.push(NeededFile::Named(PathBuf::from(scene)));
             }
-            for (name, found) in Scene::named_or_file(scene)?.files()? {
-                let scene = scene.to_owned();
-                files.push(NeededFile::OfScene { scene, name, found });
+            let read = Scene::named_or_file(scene)?;
+            let by_scene = read.file_names();
+            for (name, found) in read.files()? {
+                files.push(NeededFile::OfScene {
+                    by_mesh: by_scene.iter().all(|(named, _)| *named != name),
+                    scene: scene.to_owned(),
+                    name,
+                    found,
+                });
             }
         }
         match &self.device {

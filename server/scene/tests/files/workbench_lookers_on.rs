@@ -155,6 +155,7 @@ fn scenes_to_choose_from_are_needed_with_their_own_files_where_there_is_a_page()
             scene,
             name: "hand.csv".to_owned(),
             found: directory.path().join("hand.csv"),
+            by_mesh: false,
         };
         assert!(needed.contains(&hand), "{needed:?}");
     }

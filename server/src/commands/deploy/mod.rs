@@ -182,7 +182,9 @@ impl Plan<'_> {
                         .map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
                     (below(folder, &path)?, path, Mode::Secret)
                 }
-                NeededFile::OfScene { scene, name, found } => {
+                NeededFile::OfScene {
+                    scene, name, found, ..
+                } => {
                     let scene = Path::new(&scene);
                     let beside = match scene.is_file() {
                         true => scene.parent().unwrap_or(Path::new("")).join(name),

@@ -22,19 +22,27 @@ impl SceneWatch {
     /// Watches what was read just now.
     pub(super) fn new(config: &Path, workbench: &Workbench) -> Result<Self, Failure> {
         let mut paths = Vec::new();
+        let mut of_meshes = Vec::new();
         for file in workbench.needed_files()? {
             match file {
-                NeededFile::OfScene { scene, found, .. } if scene == workbench.scene => {
-                    paths.push(found)
+                NeededFile::OfScene {
+                    scene,
+                    found,
+                    by_mesh,
+                    ..
+                } if scene == workbench.scene => {
+                    of_meshes.extend(by_mesh.then(|| found.clone()));
+                    paths.push(found);
                 }
                 NeededFile::Named(path) if path == Path::new(&workbench.scene) => paths.push(path),
                 NeededFile::OfScene { .. } | NeededFile::Named(_) | NeededFile::Secret(_) => {}
             }
         }
         let mut watched = vec![config.to_path_buf()];
-        watched.extend(paths.iter().cloned());
+        let named = paths.iter().filter(|path| !of_meshes.contains(path));
+        watched.extend(named.cloned());
         Ok(Self {
-            files: FileWatch::new(watched),
+            files: FileWatch::new(watched).and_while_there(of_meshes),
             contents: contents(&workbench.scene, &paths),
             paths,
         })
@@ -136,8 +144,8 @@ mod tests {
         }
     }
 
-    /// `taut serve --follow-scene` of a workbench file in `place`; the scene's file.
-    fn followed_scene(place: &Path) -> (ServeArgs, PathBuf) {
+    /// `taut serve --follow-scene` of a workbench file in `place`, and of this scene there.
+    fn followed_scene(place: &Path, text: &str) -> (ServeArgs, PathBuf) {
         let [config, key, scene] =
             ["workbench.toml", "key", "scene.toml"].map(|name| place.join(name));
         let scene_name = scene.to_str().expect("a plain path");
@@ -146,7 +154,7 @@ mod tests {
             &format!("scene = \"{scene_name}\""),
         );
         std::fs::write(&config, workbench).expect("written");
-        std::fs::write(&scene, BALL_ON_FLOOR).expect("written");
+        std::fs::write(&scene, text).expect("written");
         taut_link::create_key_file(&key).expect("a key");
         let words = ["serve".as_ref(), "--config".as_ref(), config.as_os_str()];
         let more = ["--key".as_ref(), key.as_os_str(), "--follow-scene".as_ref()];
@@ -156,17 +164,22 @@ mod tests {
         (args, scene)
     }
 
+    fn following(args: ServeArgs) -> (Loader, SceneWatch) {
+        let loader = Loader::new(args, Overrides::default());
+        let mut first = loader.load().unwrap_or_else(|error| panic!("{error}"));
+        let watch = first.files.take().expect("it follows");
+        (loader, watch)
+    }
+
     #[test]
     fn a_scene_that_is_written_while_it_is_read_makes_one_session_and_that_of_the_new_text() {
         let place = tempfile::tempdir().expect("a directory");
-        let (args, scene) = followed_scene(place.path());
+        let (args, scene) = followed_scene(place.path(), BALL_ON_FLOOR);
         let write = |k_h: &str| {
             let text = BALL_ON_FLOOR.replace("2000.0", k_h);
             std::fs::write(&scene, text).expect("written");
         };
-        let loader = Loader::new(args, Overrides::default());
-        let mut first = loader.load().unwrap_or_else(|error| panic!("{error}"));
-        let mut watch = first.files.take().expect("it follows");
+        let (loader, mut watch) = following(args);
 
         write("2000.0"); // the same text, at a later time
         let none = followed(&mut watch, &loader, || write("1500.0"));
@@ -178,7 +191,7 @@ mod tests {
     #[test]
     fn what_is_kept_of_a_chosen_scene_is_no_change_of_its_file() {
         let place = tempfile::tempdir().expect("a directory");
-        let (args, _) = followed_scene(place.path());
+        let (args, _) = followed_scene(place.path(), BALL_ON_FLOOR);
         let other = place.path().join("other.toml");
         std::fs::write(&other, BALL_ON_FLOOR).expect("written");
         let name = other.to_str().expect("a plain path");
@@ -204,5 +217,23 @@ mod tests {
             known.contents == found.contents,
             "a session of its own writing"
         );
+    }
+
+    #[test]
+    fn a_library_of_materials_that_is_gone_is_a_change_as_any() {
+        let place = tempfile::tempdir().expect("a directory");
+        let write = |name: &str, text: &str| {
+            std::fs::write(place.path().join(name), text).expect("written");
+        };
+        let seen = "[[scenery]]\nname = \"seen\"\nshape = { mesh = \"a.obj\" }\n";
+        write(
+            "a.obj",
+            "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 0.03 0 0\nv 0 0.03 0\nv 0 0 0.03\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+        );
+        write("a.mtl", "newmtl m\nKd 1 0 0\n");
+        let (args, _) = followed_scene(place.path(), &format!("{BALL_ON_FLOOR}{seen}"));
+        let (loader, mut watch) = following(args);
+        std::fs::remove_file(place.path().join("a.mtl")).expect("removed");
+        assert!(followed(&mut watch, &loader, || ()).is_some());
     }
 }

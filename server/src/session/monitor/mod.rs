@@ -15,8 +15,9 @@ pub(crate) use absent::MonitorFeed;
 #[cfg(feature = "monitor")]
 pub(crate) use streaming::MonitorFeed;
 
+use std::fs;
 use std::net::IpAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use god_object::World;
@@ -44,6 +45,30 @@ pub struct MonitorSettings {
     pub memory_limit_bytes: u64,
     /// Serve the stream and the page; otherwise it is only recorded.
     pub serve: bool,
+}
+
+/// The file of a session that has not begun: dropped as such, it is removed, and the next start finds its name free.
+#[derive(Debug, Default)]
+pub(crate) struct FreshRecording(Option<PathBuf>);
+
+impl FreshRecording {
+    /// The file was made just now. What is none, such as a pipe, is left alone.
+    pub(crate) fn made(&mut self, path: Option<&Path>) {
+        self.0 = path.filter(|path| path.is_file()).map(Path::to_path_buf);
+    }
+
+    /// The session has begun: its file stays.
+    pub(crate) fn keep(&mut self) {
+        self.0 = None;
+    }
+}
+
+impl Drop for FreshRecording {
+    fn drop(&mut self) {
+        if let Some(path) = &self.0 {
+            let _ = fs::remove_file(path); // nobody is left to be told
+        }
+    }
 }
 
 /// What the monitor draws once.
