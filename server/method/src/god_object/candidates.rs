@@ -64,7 +64,7 @@ impl GodObject {
                 u16::try_from(index).unwrap_or(u16::MAX),
                 reach,
                 pairs,
-                &mut self.collision,
+                self.collision.of_obstacle(index),
                 contacts,
                 work,
             )

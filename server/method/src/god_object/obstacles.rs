@@ -116,7 +116,7 @@ impl GodObject {
         };
         let before = self.pose_at_reference_point();
         let goes_along = |placed: &PlacedObstacle| placed.goes_with(&mover);
-        let time = self.free_time(motion, goes_along, report);
+        let (time, _) = self.free_time(motion, goes_along, report);
         if time == 0.0 {
             return 0.0; // rounding is no motion
         }
@@ -189,7 +189,8 @@ impl GodObject {
     fn advance_obstacles(&mut self, share: f64, report: &mut StepReport) -> f64 {
         let settings = Self::advancement(&self.settings);
         let mut longest: f64 = 0.0;
-        for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
+        let obstacles = self.obstacles.iter_mut().zip(&self.world.obstacles);
+        for (index, (placed, obstacle)) in obstacles.enumerate() {
             if !placed.is_moving() {
                 continue;
             }
@@ -207,7 +208,7 @@ impl GodObject {
                 &self.world.body,
                 &self.pose,
                 &settings,
-                &mut self.collision,
+                self.collision.of_moving_obstacle(index),
                 &mut report.work,
             );
             let time = match found {
