@@ -95,7 +95,7 @@ impl GodObject {
                     chosen,
                 })
                 .collect(),
-            looked_at: vec![settings.look_ahead_pairs; obstacles],
+            looked_at: vec![0; obstacles],
             given: GivenRows::with_capacity(capacity),
             world,
             settings,
