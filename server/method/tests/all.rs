@@ -23,6 +23,7 @@ mod god_object_convergence;
 mod god_object_flat_landing;
 mod god_object_peg_in_hole;
 mod implicit_constraints;
+mod many_obstacles;
 mod mesh_impact;
 mod moving_friction;
 mod moving_friction_variants;

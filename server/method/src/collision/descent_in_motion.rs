@@ -154,11 +154,13 @@ impl WithSimd for DescentInMotion<'_, '_> {
         let CollisionWorkspace {
             agenda,
             stack,
-            witnesses,
+            memories,
+            current,
             intervals,
             turned,
             ..
         } = workspace;
+        let memory = &memories[*current];
         intervals.restart(first.time, search.gaps.stop);
         let mut halving = Halving {
             problem,
@@ -204,7 +206,7 @@ impl WithSimd for DescentInMotion<'_, '_> {
                     let pair = problem.pair(t, s);
                     let times = [interval.from, from, to];
                     if !search.is_free(&pair, &interval.start, times, &first.lately)
-                        && !witnesses.contains(&(t, s))
+                        && !memory.has((t, s))
                     {
                         let start = if from > interval.from {
                             problem.relative.at(from)

@@ -1,24 +1,16 @@
-//! Motions along which bodies are known to be apart, from one search to the next.
+//! The motion along which two bodies are known to be apart, from one search to the next.
 //!
 //! A search that begins where the last one ended need not look again whether the surfaces cross, whichever of the two moved then, about whatever
 //! point.
 
-use arrayvec::ArrayVec;
-
 use super::motion::{Placement, RelativeMotion};
 
-/// Motions remembered: one for each obstacle of a scene with no more, the latest otherwise.
-const MAX_MOTIONS: usize = 16;
 /// A body that is off a known place by less than this share of the gap there is apart, too.
 const SHARE_OF_GAP: f64 = 0.5;
 
-/// The latest motions, newest first.
+/// The latest motion of two bodies, if there was one.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct KnownApart {
-    motions: ArrayVec<Known, MAX_MOTIONS>,
-    /// The newest is the one in which a body was found last.
-    newest_serves: bool,
-}
+pub(super) struct KnownApart(Option<Known>);
 
 #[derive(Clone, Copy, Debug)]
 struct Known {
@@ -31,8 +23,7 @@ struct Known {
 }
 
 impl KnownApart {
-    /// Remembers that two meshes stay apart by `gap`, m, up to the time `until` of a motion; it takes the place of the one
-    /// that [`Self::knows`] found last.
+    /// Remembers that two meshes stay apart by `gap`, m, up to the time `until` of a motion, in place of the motion before.
     pub(super) fn remember(
         &mut self,
         key: [u64; 2],
@@ -40,36 +31,21 @@ impl KnownApart {
         until: f64,
         gap: f64,
     ) {
-        if self.newest_serves || self.motions.is_full() {
-            let last = self.motions.len() - 1;
-            self.motions
-                .remove(if self.newest_serves { 0 } else { last });
-        }
-        self.motions.insert(
-            0,
-            Known {
-                key,
-                motion: *motion,
-                until,
-                gap,
-            },
-        );
-        self.newest_serves = false;
+        self.0 = Some(Known {
+            key,
+            motion: *motion,
+            until,
+            gap,
+        });
     }
 
     /// Whether the meshes are known to be apart with the body there; the radii bound the distance of the body's points from G, and of the obstacle's
     /// from its origin, m.
-    pub(super) fn knows(&mut self, key: [u64; 2], body: &Placement, radii: [f64; 2]) -> bool {
-        let (turned, obstacle) = ([key[1], key[0]], body.inverse());
-        let found = self.motions.iter().position(|known| {
+    pub(super) fn knows(&self, key: [u64; 2], body: &Placement, radii: [f64; 2]) -> bool {
+        self.0.as_ref().is_some_and(|known| {
             known.key == key && known.holds(body, radii[0])
-                || known.key == turned && known.holds(&obstacle, radii[1])
-        });
-        if let Some(index) = found {
-            self.motions[..=index].rotate_right(1);
-        }
-        self.newest_serves = found.is_some();
-        self.newest_serves
+                || known.key == [key[1], key[0]] && known.holds(&body.inverse(), radii[1])
+        })
     }
 }
 
@@ -124,7 +100,6 @@ mod tests {
             assert_eq!(known.knows(KEY, &first, RADII), k > 0);
             known.remember(KEY, &relative, until, 1e-6);
             assert!(!known.knows(KEY, &relative.at(until + 0.01), RADII));
-            assert_eq!(known.motions.len(), 1);
             // To the end, or part of the way, as when another obstacle is met first; through the body's own pose.
             let made = if k % 3 == 0 { 0.6 * until } else { until };
             let own = from_reference_point(&motion.pose_at(made), &point);
@@ -155,7 +130,6 @@ mod tests {
             let first = relative.at(0.0);
             assert_eq!(known.knows(key, &first, RADII), k > 0, "{k}");
             known.remember(key, &relative, 0.8, 1e-6);
-            assert_eq!(known.motions.len(), 1);
             let beyond = relative.at(0.81);
             assert!(!known.knows(key, &beyond, RADII));
             assert!(!known.knows([key[1], key[0]], &beyond.inverse(), RADII));

@@ -103,6 +103,7 @@ pub fn time_of_impact(
                 };
                 let kept = current.gaps.stop - current.gaps.slack;
                 workspace
+                    .memory_mut()
                     .apart
                     .remember(problem.key(), &relative, until, kept);
                 return answer;
@@ -129,7 +130,7 @@ impl Problem<'_> {
     ) -> bool {
         let start = self.relative.at(0.0);
         let radii = [radius, self.obstacle.radius_bound_about(&Point3::origin())];
-        if workspace.apart.knows(self.key(), &start, radii) {
+        if workspace.memory().apart.knows(self.key(), &start, radii) {
             return false;
         }
         let trees = (self.body.wide_tree(), self.obstacle.wide_tree());
@@ -173,9 +174,9 @@ impl Problem<'_> {
         // The nearest pairs of the last search bound the time before the trees are touched.
         let start = self.relative.at(0.0);
         let (bodies, obstacles) = (self.body.triangles().len(), self.obstacle.triangles().len());
-        for &(a, b) in workspace
-            .witnesses
-            .iter()
+        for (a, b) in workspace
+            .memory()
+            .pairs()
             .filter(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles)
         {
             let pair = self.pair(a, b);
@@ -200,7 +201,7 @@ impl Problem<'_> {
             return Err(first.near);
         }
         if let Some((pair, _)) = first.hit {
-            workspace.remember(pair);
+            workspace.memory_mut().remember(pair);
         }
         Ok(first.answer())
     }

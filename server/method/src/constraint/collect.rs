@@ -112,12 +112,11 @@ pub(crate) fn collect_bounded(
     if truncated {
         complete_within = complete_within.min(candidates.last().map_or(0.0, |c| c.gap));
     }
-    workspace.witnesses.clear();
+    let witnesses = &mut workspace.memories[workspace.current].witnesses;
+    witnesses.clear();
     for contact in candidates.iter().take(MAX_WITNESSES) {
         if let Some(triangle) = triangle_of(body, contact.features.on_body) {
-            workspace
-                .witnesses
-                .push((triangle, contact.obstacle_triangle));
+            witnesses.push((triangle, contact.obstacle_triangle));
         }
     }
     let gap_min = candidates.first().map_or(f64::INFINITY, |c| c.gap);

@@ -31,19 +31,25 @@ impl GodObject {
         self.set.gap_min = self.set.gap_min.min(gap_min);
     }
 
-    /// Most pairs to look at for one obstacle, whichever comes first: what those do not need that needed little last time is the others'.
+    /// Most pairs to look at for one obstacle, whichever comes first: what those do not need that needed less last time is the others'.
     fn share(&self) -> u64 {
         let all = self.settings.look_ahead_pairs;
-        let count = |chosen: usize| (chosen as u64).max(1);
         let chosen = || {
             let both = self.places.iter().zip(&self.looked_at);
             both.filter(|(place, _)| place.chosen)
                 .map(|(_, pairs)| *pairs)
         };
-        let little = all / (2 * count(chosen().count()));
-        let spent: u64 = chosen().filter(|pairs| *pairs < little).sum();
-        let others = count(chosen().filter(|pairs| *pairs >= little).count());
-        (all.saturating_sub(spent) / others).max(1)
+        let mut share = 1;
+        loop {
+            let less = chosen().filter(|pairs| *pairs < share);
+            let (count, spent) = less.fold((0, 0), |(n, sum), pairs| (n + 1, sum + pairs));
+            let others = (chosen().count() as u64).saturating_sub(count).max(1);
+            let larger = all.saturating_sub(spent) / others;
+            if larger <= share {
+                return share;
+            }
+            share = larger;
+        }
     }
 
     /// Leaves those of one obstacle within `distance`, m, in `self.contacts`, nearest first, as many as so many pairs of triangles and features tell.
@@ -64,7 +70,7 @@ impl GodObject {
                 u16::try_from(index).unwrap_or(u16::MAX),
                 reach,
                 pairs,
-                &mut self.collision,
+                self.collision.of_obstacle(index),
                 contacts,
                 work,
             )

@@ -148,7 +148,7 @@ impl GodObject {
                 &self.obstacles[index].pose,
                 u16::try_from(index).unwrap_or(u16::MAX),
                 distance,
-                &mut self.collision,
+                self.collision.of_obstacle(index),
                 &mut self.contacts,
                 work,
             );

@@ -7,16 +7,17 @@ use crate::settings::Settings;
 use crate::shape;
 
 impl GodObject {
-    /// The fraction of the motion that is free of every obstacle but those that go along, in [0, 1].
+    /// The fraction of the motion that is free of every obstacle but those that go along, in [0, 1], and which obstacle stops it there.
     pub(super) fn free_time(
         &mut self,
         mut motion: Motion,
         goes_along: impl Fn(&PlacedObstacle) -> bool,
         report: &mut StepReport,
-    ) -> f64 {
+    ) -> (f64, Option<usize>) {
         let settings = Self::advancement(&self.settings);
-        let mut free = 1.0;
-        for (obstacle, placed) in self.world.obstacles.iter().zip(&self.obstacles) {
+        let (mut free, mut stopped) = (1.0, None);
+        let obstacles = self.world.obstacles.iter().zip(&self.obstacles);
+        for (index, (obstacle, placed)) in obstacles.enumerate() {
             if goes_along(placed) {
                 continue;
             }
@@ -26,7 +27,7 @@ impl GodObject {
                 obstacle,
                 &placed.pose,
                 &settings,
-                &mut self.collision,
+                self.collision.of_obstacle(index),
                 &mut report.work,
             );
             let time = match found {
@@ -38,11 +39,14 @@ impl GodObject {
             let shortened = time.clamp(0.0, 1.0);
             free *= shortened;
             motion.displacement *= shortened;
+            if shortened < 1.0 {
+                stopped = Some(index);
+            }
             if shortened == 0.0 {
                 break;
             }
         }
-        free
+        (free, stopped)
     }
 
     /// Tolerances and limits of the collision searches.

@@ -47,9 +47,12 @@ impl GodObject {
             return false;
         };
         if let Some(at) = self.place() {
-            let stopped = std::mem::take(&mut self.stopped);
-            let witness = self.collision.witnesses.first().filter(|_| stopped);
-            reduction.move_to((&at, &self.surfaces(None)), witness.copied(), work);
+            let stopped = self.stopped.take();
+            let witness = stopped.and_then(|index| {
+                let witnesses = &self.collision.memories[index].witnesses;
+                witnesses.first().map(|pair| (index, *pair))
+            });
+            reduction.move_to((&at, &self.surfaces(None)), witness, work);
             let (moved, within) = (reduction.moved(self.radius), reduction.served());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;

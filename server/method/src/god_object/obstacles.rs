@@ -13,6 +13,7 @@
 //!
 //! Before that, the body goes along with the obstacle that is nearest, as one rigid body with it, as far as that is free of the others; from there the
 //! hand leads it back. So a body in a part that moves does what it does in one that stands, with the same rows, and is searched for impact no more often.
+//! It stays where the obstacle slides past it without friction: in a late update it would be taken round what the hand does not lead it back about.
 
 use nalgebra::Vector3;
 
@@ -105,6 +106,9 @@ impl GodObject {
         let Some(mover) = self.nearest_moving_obstacle() else {
             return 0.0;
         };
+        if !self.is_taken_along(&mover, report) {
+            return 0.0;
+        }
         let displacement = mover.left();
         // The obstacle's origin goes straight.
         let straight = mover.pose.translation.vector;
@@ -116,7 +120,7 @@ impl GodObject {
         };
         let before = self.pose_at_reference_point();
         let goes_along = |placed: &PlacedObstacle| placed.goes_with(&mover);
-        let time = self.free_time(motion, goes_along, report);
+        let (time, _) = self.free_time(motion, goes_along, report);
         if time == 0.0 {
             return 0.0; // rounding is no motion
         }
@@ -153,6 +157,37 @@ impl GodObject {
         nearest.map(|(_, placed)| *placed)
     }
 
+    /// Whether one of the obstacles that make the mover's motion does more than slide past the body without friction, which leaves it in the hand.
+    fn is_taken_along(&mut self, mover: &PlacedObstacle, report: &mut StepReport) -> bool {
+        for index in 0..self.obstacles.len() {
+            let placed = self.obstacles[index];
+            if !placed.goes_with(mover) {
+                continue;
+            }
+            let rough = self.world.obstacles[index].surface.friction > 0.0;
+            if rough || !self.slides_past(index) {
+                return true;
+            }
+            let (_, time) = self.free_way(index, &placed.left(), report);
+            if time < 1.0 {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Whether no row of an obstacle becomes shorter or longer by the way that it has left.
+    fn slides_past(&self, index: usize) -> bool {
+        let placed = &self.obstacles[index];
+        let motion = placed.target * placed.pose.inverse();
+        let rows = self.set.constraints.iter();
+        let mut rows = rows.filter(|row| usize::from(row.features.obstacle) == index);
+        rows.all(|row| {
+            let way = row.normal.dot(&(motion * row.point - row.point));
+            way.abs() <= self.settings.motion_tolerance // false for NaN
+        })
+    }
+
     /// A half-space has no farthest point: what counts is the part that the body can reach.
     fn bound_half_spaces(&mut self) {
         let center = self.pose_at_reference_point().translation.vector;
@@ -187,39 +222,17 @@ impl GodObject {
 
     /// Every obstacle goes `share` of its way, as far as it is free of the body. The longest path made, m.
     fn advance_obstacles(&mut self, share: f64, report: &mut StepReport) -> f64 {
-        let settings = Self::advancement(&self.settings);
         let mut longest: f64 = 0.0;
-        for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
+        for index in 0..self.obstacles.len() {
+            let placed = self.obstacles[index];
             if !placed.is_moving() {
                 continue;
             }
             let displacement = placed.left() * share;
-            let way = ObstacleWay::new(
-                obstacle,
-                &placed.pose,
-                &displacement,
-                &self.world.body,
-                &self.pose,
-            );
-            let found = shape::time_of_impact_of_obstacle(
-                obstacle,
-                &way,
-                &self.world.body,
-                &self.pose,
-                &settings,
-                &mut self.collision,
-                &mut report.work,
-            );
-            let time = match found {
-                TimeOfImpact::Separated => 1.0,
-                TimeOfImpact::Impact { time } | TimeOfImpact::IterationLimit { time } => {
-                    time.clamp(0.0, 1.0)
-                }
-                TimeOfImpact::Overlapping => 0.0,
-            };
+            let (way, time) = self.free_way(index, &displacement, report);
             if time > 0.0 {
                 longest = longest.max(placed.length(&displacement) * time);
-                placed.pose = if time >= 1.0 && share >= 1.0 {
+                self.obstacles[index].pose = if time >= 1.0 && share >= 1.0 {
                     placed.target
                 } else {
                     way.pose_at(time)
@@ -227,6 +240,35 @@ impl GodObject {
             }
         }
         longest
+    }
+
+    /// The way of an obstacle over a displacement, and the share of it that is free of the body.
+    fn free_way(
+        &mut self,
+        index: usize,
+        displacement: &Vector6,
+        report: &mut StepReport,
+    ) -> (ObstacleWay, f64) {
+        let (body, obstacle) = (&self.world.body, &self.world.obstacles[index]);
+        let start = &self.obstacles[index].pose;
+        let way = ObstacleWay::new(obstacle, start, displacement, body, &self.pose);
+        let found = shape::time_of_impact_of_obstacle(
+            obstacle,
+            &way,
+            body,
+            &self.pose,
+            &Self::advancement(&self.settings),
+            self.collision.of_moving_obstacle(index),
+            &mut report.work,
+        );
+        let time = match found {
+            TimeOfImpact::Separated => 1.0,
+            TimeOfImpact::Impact { time } | TimeOfImpact::IterationLimit { time } => {
+                time.clamp(0.0, 1.0)
+            }
+            TimeOfImpact::Overlapping => 0.0,
+        };
+        (way, time)
     }
 
     /// Moves the body ahead of the obstacles for `share` of what they have left. The path made, m; `None` when the rows leave no room.

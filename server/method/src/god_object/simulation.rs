@@ -51,8 +51,8 @@ pub struct GodObject {
     pub(super) wanted: f64,
     /// How much farther than its pose says the device may be, m: see [`GodObject::set_device_ahead`].
     pub(super) device_ahead: f64,
-    /// An obstacle has stopped a motion since the rows were last taken to the body's pose: the pair that did is a row.
-    pub(super) stopped: bool,
+    /// The obstacle that has stopped a motion since the rows were last taken to the body's pose: the pair that did is a row.
+    pub(super) stopped: Option<usize>,
     /// One has in this update: there may be more pairs that no row stands for.
     pub(super) was_stopped: bool,
     /// Distance within which the present set has every row, m.
@@ -75,6 +75,7 @@ impl GodObject {
         Self::check_start(&world, &settings, &start)?;
         let capacity = settings.max_constraints;
         let radius = world.body.mesh.radius_about(&world.body.reference_point);
+        let obstacles = world.obstacles.len();
         let mut god_object = Self {
             friction: Friction::of(&world, &settings),
             carry: Carry::default(),
@@ -94,14 +95,14 @@ impl GodObject {
                     chosen,
                 })
                 .collect(),
-            looked_at: vec![settings.look_ahead_pairs; world.obstacles.len()],
+            looked_at: vec![0; obstacles],
             given: GivenRows::with_capacity(capacity),
             world,
             settings,
             pose: start,
             set: ConstraintSet::with_capacity(GivenRows::room(capacity)),
             projector: Projector::new(settings.solver, capacity).with_reference_fallback(true),
-            collision: CollisionWorkspace::new(),
+            collision: CollisionWorkspace::for_obstacles(obstacles),
             contacts: Vec::with_capacity(capacity),
             // Within the rest distance the linear rows do, and their sub-steps come to rest where those of the rounds may circle.
             implicit: ImplicitRounds::new(
@@ -121,7 +122,7 @@ impl GodObject {
             device_step: Vector6::zeros(),
             wanted: settings.activation_distance,
             device_ahead: 0.0,
-            stopped: false,
+            stopped: None,
             was_stopped: false,
             collected_within: 0.0,
             affordable: settings.activation_distance + settings.look_ahead_limit,

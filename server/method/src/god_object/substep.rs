@@ -218,9 +218,9 @@ impl GodObject {
         report: &mut StepReport,
     ) -> f64 {
         let motion = self.motion(displacement, &projected.straight);
-        let time = self.free_time(motion, |_| false, report);
-        self.stopped |= time < 1.0;
-        self.was_stopped |= time < 1.0;
+        let (time, stopped) = self.free_time(motion, |_| false, report);
+        self.stopped = stopped.or(self.stopped);
+        self.was_stopped |= stopped.is_some();
         if time > 0.0 {
             let reached = motion.pose_at(time);
             self.pose = from_reference_point(&reached, &motion.reference_point);

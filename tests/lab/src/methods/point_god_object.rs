@@ -72,7 +72,7 @@ impl PointGodObject {
             metric: Metric::new(1.0, &Matrix3::identity()).expect("1 kg is positive"),
             projector: Projector::new(SolverKind::ActiveSet, settings.max_constraints),
             finder: ContactFinder::new(&settings),
-            workspace: CollisionWorkspace::new(),
+            workspace: CollisionWorkspace::for_obstacles(scene.world.obstacles.len()),
         }
     }
 
@@ -112,14 +112,14 @@ impl PointGodObject {
         };
         let (workspace, work) = (&mut self.workspace, &mut Work::default());
         let mut free: f64 = 1.0;
-        for obstacle in &self.world.obstacles {
+        for (index, obstacle) in self.world.obstacles.iter().enumerate() {
             let found = time_of_impact(
                 body,
                 &motion,
                 obstacle,
                 &obstacle.pose,
                 &settings,
-                workspace,
+                workspace.of_obstacle(index),
                 work,
             );
             free = free.min(match found {

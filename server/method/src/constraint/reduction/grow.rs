@@ -192,41 +192,36 @@ impl RowReduction {
         })
     }
 
-    /// Adds what faces between two triangles that stopped a motion.
+    /// Adds what faces between two triangles, of the body and of an obstacle, that stopped a motion.
     pub(super) fn take_witness(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
-        (a, b): (u32, u32),
+        (index, (a, b)): (usize, (u32, u32)),
         work: &mut Work,
     ) {
-        // A witness does not say which obstacle it is of; a pair of another does not face, or is a pair like any.
-        for index in 0..at.places.len() {
-            let (mesh, pose) = at.obstacle(index);
-            let body = &at.world.body.mesh;
-            let there =
-                (a as usize) < body.triangles().len() && (b as usize) < mesh.triangles().len();
-            if !there || !at.places[index].chosen {
-                continue;
-            }
-            let placement = Placement::of(&at.pose, pose);
-            let facing = Facing {
-                body,
-                obstacle: mesh,
-                placement: &placement,
-                obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
-                activation_distance: WITNESS_REST_DISTANCES * at.rest_distance,
-                past_reentrant_edges: false,
-            };
-            // The features that touch may be other triangles' to look at.
-            for a in owners(body, a) {
-                for b in owners(mesh, b) {
-                    for_contacts(&facing, &facing.pair(a, b), work, |contact| {
-                        if !self.knows(&contact.features) {
-                            let contact = in_world(&contact, pose);
-                            self.add(Known::of(&contact, surfaces, &at.center()));
-                        }
-                    });
-                }
+        if !at.places[index].chosen {
+            return;
+        }
+        let (obstacle, pose) = at.obstacle(index);
+        let body = &at.world.body.mesh;
+        let placement = Placement::of(&at.pose, pose);
+        let facing = Facing {
+            body,
+            obstacle,
+            placement: &placement,
+            obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
+            activation_distance: WITNESS_REST_DISTANCES * at.rest_distance,
+            past_reentrant_edges: false,
+        };
+        // The features that touch may be other triangles' to look at.
+        for a in owners(body, a) {
+            for b in owners(obstacle, b) {
+                for_contacts(&facing, &facing.pair(a, b), work, |contact| {
+                    if !self.knows(&contact.features) {
+                        let contact = in_world(&contact, pose);
+                        self.add(Known::of(&contact, surfaces, &at.center()));
+                    }
+                });
             }
         }
     }

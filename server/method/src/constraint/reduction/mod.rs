@@ -139,11 +139,11 @@ impl RowReduction {
 
     /// Takes the rows to a new pose: pairs that face no more are let go, the candidates' gaps are carried on by their Jacobians.
     ///
-    /// `witness` is the pair of triangles that stopped the last motion, if any did: what faces there becomes a row.
+    /// `witness` is the obstacle that stopped the last motion and the pair of triangles that did, if any: what faces there becomes a row.
     pub(crate) fn move_to(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
-        witness: Option<(u32, u32)>,
+        witness: Option<(usize, (u32, u32))>,
         work: &mut Work,
     ) {
         self.error = 0.0;

@@ -1,0 +1,181 @@
+//! Many meshes about a body: what a search costs is what is near, whatever the order of the obstacles and whatever is far away.
+
+use std::sync::Arc;
+
+use crate::geometry_shapes::{icosphere, mesh};
+use god_object::collision::{
+    AdvancementSettings, CollisionWorkspace, Motion, Work, time_of_impact,
+};
+use god_object::nalgebra::{Matrix3, Point3, Vector3};
+use god_object::spatial::six;
+use god_object::{
+    Body, Coupling, GodObject, Mesh, Obstacle, Pose, Settings, Surface, Vector6, World,
+};
+
+const PEBBLES: usize = 40;
+const UPDATES: u32 = 120;
+/// Between a leaf and the next, rad.
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+
+fn ball() -> Mesh {
+    mesh(icosphere(0.02, 2))
+}
+
+/// Small balls, evenly spread over a sphere of this radius, m, about the origin.
+fn pebbles(radius: f64) -> Vec<Obstacle> {
+    let pebble = |k: usize| {
+        let z = 1.0 - (2.0 * k as f64 + 1.0) / PEBBLES as f64;
+        let angle = GOLDEN_ANGLE * (k as f64 + 0.5);
+        let across = (1.0 - z * z).sqrt();
+        let out = Vector3::new(across * angle.cos(), across * angle.sin(), z);
+        Obstacle {
+            name: format!("pebble {k}"),
+            mesh: mesh(icosphere(6e-3, 2)),
+            primitive: None,
+            pose: Pose::new(out * radius, out * 3.0),
+            surface: Surface::default(),
+        }
+    };
+    (0..PEBBLES).map(pebble).collect()
+}
+
+/// What a ball that is pulled about among obstacles does.
+struct Course {
+    wrenches: Vec<Vector6>,
+    work: Work,
+    substeps: u32,
+}
+
+impl Course {
+    fn among(obstacles: Vec<Obstacle>) -> Self {
+        let body = Body {
+            mesh: ball(),
+            primitive: None,
+            mass: 0.2,
+            inertia: Matrix3::identity() * 4e-5,
+            reference_point: Point3::origin(),
+        };
+        let world = Arc::new(World { body, obstacles });
+        let settings = Settings::for_size(0.04);
+        let start = Pose::identity();
+        let mut god_object = GodObject::new(world.clone(), settings, start).expect("a free start");
+        let mut coupling = Coupling::new(&world, &settings);
+        let mut course = Self {
+            wrenches: Vec::new(),
+            work: Work::default(),
+            substeps: 0,
+        };
+        for update in 0..UPDATES {
+            let u = 0.05 * f64::from(update);
+            let place = Vector3::new(0.02 * u.cos(), 0.02 * u.sin(), 0.012 * (0.7 * u).sin());
+            let device = Pose::new(place, Vector3::new(0.1 * u, -0.05 * u, 0.0));
+            let report = god_object.step(&device, None);
+            course.work += report.work;
+            course.substeps += report.substeps;
+            let set = god_object.constraint_set();
+            let felt = coupling.step(1e-3 * f64::from(update), &device, set);
+            course.wrenches.push(felt.wrench);
+        }
+        course
+    }
+
+    /// The largest difference of wrenches, N and N m.
+    fn off(&self, other: &Self) -> f64 {
+        let both = self.wrenches.iter().zip(&other.wrenches);
+        both.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    }
+
+    /// Pairs of triangles and of features, and steps with them: what two surfaces cost that are near each other.
+    fn near_work(&self) -> [u64; 3] {
+        let work = &self.work;
+        [
+            work.triangle_pairs,
+            work.feature_pairs,
+            work.advancement_steps,
+        ]
+    }
+}
+
+/// Whether counts are the same to some percent, for hints of where the first impact may be.
+fn alike(a: u64, b: u64) -> bool {
+    a.abs_diff(b) <= a / 20
+}
+
+#[test]
+fn forces_and_work_do_not_depend_on_the_order_of_the_obstacles() {
+    let near = pebbles(0.03);
+    let course = Course::among(near.clone());
+    let largest = course
+        .wrenches
+        .iter()
+        .map(Vector6::norm)
+        .fold(0.0, f64::max);
+    assert!(largest > 3.0, "{largest} N");
+    for places in [1, PEBBLES / 2] {
+        let mut other = near.clone();
+        other.rotate_left(places);
+        if places == 1 {
+            other.reverse();
+        }
+        let other = Course::among(other);
+        assert!(course.off(&other) < 1e-6, "{:e} N", course.off(&other));
+        assert_eq!(course.substeps, other.substeps);
+        let (work, others) = (course.near_work(), other.near_work());
+        for (a, b) in work.into_iter().zip(others) {
+            assert!(alike(a, b), "{work:?} {others:?}");
+        }
+        let [a, b] = [course.work, other.work].map(|work| work.node_pairs);
+        assert!(alike(a, b), "{a} {b}");
+    }
+}
+
+#[test]
+fn obstacles_far_away_change_no_force_and_cost_no_more_than_their_roots() {
+    let near = pebbles(0.03);
+    let course = Course::among(near.clone());
+    let far = pebbles(10.0);
+    for first in [false, true] {
+        let more = if first {
+            [far.clone(), near.clone()].concat()
+        } else {
+            [near.clone(), far.clone()].concat()
+        };
+        let other = Course::among(more);
+        assert_eq!(course.off(&other), 0.0);
+        let (work, others) = (course.near_work(), other.near_work());
+        for (a, b) in work.into_iter().zip(others) {
+            assert!(alike(a, b), "{work:?} {others:?}");
+        }
+        // Each of them: one pair of volumes in each search and collection.
+        let most = 2 * u64::from(other.substeps + UPDATES) * PEBBLES as u64;
+        let added = other.work.node_pairs.saturating_sub(course.work.node_pairs);
+        assert!(added <= most, "{added} {most}");
+    }
+}
+
+#[test]
+fn searches_of_many_obstacles_cost_what_each_one_costs_alone() {
+    let (body, obstacles) = (ball(), pebbles(0.03));
+    let mut shared = CollisionWorkspace::for_obstacles(PEBBLES);
+    let mut alone = vec![CollisionWorkspace::new(); PEBBLES];
+    let settings = AdvancementSettings::default();
+    for update in 0..3 {
+        let motion = Motion {
+            start: Pose::translation(1e-4 * f64::from(update), 0.0, 0.0),
+            displacement: six(&(Vector3::x() * 1e-4), &Vector3::zeros()),
+            reference_point: Point3::origin(),
+        };
+        for (index, (obstacle, own)) in obstacles.iter().zip(&mut alone).enumerate() {
+            let [(found, work), (expected, least)] =
+                [shared.of_obstacle(index), own].map(|workspace| {
+                    let mut work = Work::default();
+                    let (other, at) = (&obstacle.mesh, &obstacle.pose);
+                    let found =
+                        time_of_impact(&body, &motion, other, at, &settings, workspace, &mut work);
+                    (found, work)
+                });
+            assert_eq!(found, expected);
+            assert_eq!(work, least, "{index} in update {update}");
+        }
+    }
+}
