@@ -509,6 +509,27 @@ fn what_is_kept_is_in_the_file_with_its_comments_and_no_other_change_of_the_file
 }
 
 #[test]
+fn what_runs_already_is_kept_without_another_session() {
+    let served = serve(&[], &[]);
+    served.wait_for_run("paused");
+    let edit = "plate.surface.friction=0.5";
+    let (code, said) = served.taut_edit(&[edit]);
+    assert!(
+        code == Some(0) && said.contains("does not have it"),
+        "{said}"
+    );
+    let (code, said) = served.taut_edit(&["--keep", edit]);
+    assert!(code == Some(0) && said.contains("kept: "), "{said}");
+    let kept = SCENE.replace("friction = 0.2", "friction = 0.5");
+    assert_eq!(served.file(), kept);
+    assert_eq!(served.scene()["standing"]["not_kept"], json!([]));
+    assert_eq!(served.revision(), 2, "no session for that");
+    // The file has it now.
+    let (code, said) = served.taut_edit(&["--keep", edit]);
+    assert!(code == Some(2) && said.contains("already"), "{said}");
+}
+
+#[test]
 fn another_scene_is_chosen_of_those_that_the_workbench_file_names() {
     let changes = [
         ("rearm = \"manual\"", "rearm = \"automatic\""),

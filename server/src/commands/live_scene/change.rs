@@ -36,31 +36,37 @@ pub(super) struct Change {
 }
 
 impl Wanted {
-    /// Everything that can be wrong is found here; nothing is opened and nothing written.
-    pub(super) fn make(self) -> Result<Change, Failure> {
+    /// Everything that can be wrong is found here; nothing is opened and nothing written. `None`: it runs so already, and the file is to have it.
+    pub(super) fn make(self) -> Result<Option<Change>, Failure> {
         let keep = self.wish.keep;
-        let (mut next, what) = match &self.wish.scene {
-            Some(named) => self.another(named)?,
+        let made = match &self.wish.scene {
+            Some(named) => Some(self.another(named)?),
             None => self.same()?,
+        };
+        let Some((mut next, what)) = made else {
+            return Ok(None);
         };
         if keep {
             next.not_kept.clear();
         }
         Session::begin(&next.setup)?;
-        Ok(Change { next, what, keep })
+        Ok(Some(Change { next, what, keep }))
     }
 
-    /// The scene that runs, with some keys set.
-    fn same(&self) -> Result<(Next, String), Failure> {
+    /// The scene that runs, with some keys set; `None` as for [`Wanted::make`].
+    fn same(&self) -> Result<Option<(Next, String)>, Failure> {
         let (edited, keys) = self.scene.edited(&self.wish.edits)?;
         if edited.text() == self.scene.text() {
+            if self.wish.keep && !self.not_kept.is_empty() {
+                return Ok(None);
+            }
             return Err(Failure::bad_input("the scene has all of that already"));
         }
         let mut next = self.loader.change(&self.from, edited)?;
         next.in_file = self.in_file.clone();
         next.not_kept = self.not_kept.clone();
         let named = tell(&keys, &mut next.not_kept);
-        Ok((next, named))
+        Ok(Some((next, named)))
     }
 
     /// Another scene, or this one as its file is, with some keys set.

@@ -36,7 +36,7 @@ const SHORTEST_LIFE: Duration = Duration::from_secs(1);
 /// A wish that is being looked at, on a thread of its own.
 struct Pending {
     asked: AskedScene,
-    thread: JoinHandle<Result<Change, Failure>>,
+    thread: JoinHandle<Result<Option<Change>, Failure>>,
 }
 
 /// A wish whose session begins now, and what it came to.
@@ -257,6 +257,11 @@ impl LiveScene {
                 "the program broke down over it; look at the server's log",
             ))
         });
+        let Some(made) = made.transpose() else {
+            let kept = self.keep_as_it_runs(&asked);
+            asked.answer(kept.map_err(|why| format!("not kept: {why}")));
+            return None;
+        };
         let written = made.and_then(|mut change| {
             if change.keep {
                 self.write(&mut change.next)?;
