@@ -48,11 +48,14 @@ pub struct EditArgs {
 
 /// Changes the scene, or shows it; what to print.
 pub(super) fn run(args: &EditArgs) -> Result<String, Failure> {
-    let page = address(&args.page)?;
+    let page = addresses(&args.page)?;
     if args.edits.is_empty() && args.scene.is_none() && !args.keep {
-        let text = ask(page, "GET /scene", "", "")?;
+        let text = ask(&page, "GET /scene", "", "")?;
         return overview(&text).ok_or_else(|| {
-            Failure::failed(format!("{page} is no operator's page of this version"))
+            Failure::failed(format!(
+                "{} is no operator's page of this version",
+                args.page
+            ))
         });
     }
     let Some(file) = &args.token_file else {
@@ -73,32 +76,47 @@ pub(super) fn run(args: &EditArgs) -> Result<String, Failure> {
         "keep": args.keep,
     });
     let shown = format!("Authorization: Bearer {token}\r\n");
-    ask(page, "POST /edit", &shown, &wish.to_string())
+    ask(&page, "POST /edit", &shown, &wish.to_string())
 }
 
-/// The token goes over no network in the clear.
-fn address(named: &str) -> Result<SocketAddr, Failure> {
+/// Those of this machine, one at least: the token goes over no network in the clear.
+fn addresses(named: &str) -> Result<Vec<SocketAddr>, Failure> {
     let found = named.to_socket_addrs().map_err(|error| {
         Failure::BadInput(format!(
             "--page {named} is no address ({error}); write 127.0.0.1:4861"
         ))
     })?;
-    let mut here = found.filter(|address| address.ip().is_loopback());
-    here.next().ok_or_else(|| {
-        Failure::BadInput(format!(
+    let here: Vec<SocketAddr> = found.filter(|address| address.ip().is_loopback()).collect();
+    if here.is_empty() {
+        return Err(Failure::BadInput(format!(
             "--page {named} is not on this machine, and the token goes over no network; use ssh -L 4861:127.0.0.1:4861 HOST"
-        ))
-    })
+        )));
+    }
+    Ok(here)
+}
+
+/// A connection to the first of these that takes one, and which that is. A page listens on one of the addresses that `localhost` may be.
+fn reach(page: &[SocketAddr]) -> Result<(TcpStream, SocketAddr), Failure> {
+    let mut why = String::new();
+    for &address in page {
+        match TcpStream::connect_timeout(&address, REACHING) {
+            Ok(stream) => return Ok((stream, address)),
+            Err(error) => why = lost(address, &error),
+        }
+    }
+    Err(Failure::Failed(why))
+}
+
+fn lost(page: SocketAddr, error: &std::io::Error) -> String {
+    format!(
+        "the operator's page at {page} was not reached ({error}); check that [operator] is enabled, and its port"
+    )
 }
 
 /// The body of the page's answer.
-fn ask(page: SocketAddr, line: &str, shown: &str, body: &str) -> Result<String, Failure> {
-    let lost = |error: std::io::Error| {
-        Failure::Failed(format!(
-            "the operator's page at {page} was not reached ({error}); check that [operator] is enabled, and its port"
-        ))
-    };
-    let mut stream = TcpStream::connect_timeout(&page, REACHING).map_err(lost)?;
+fn ask(page: &[SocketAddr], line: &str, shown: &str, body: &str) -> Result<String, Failure> {
+    let (mut stream, page) = reach(page)?;
+    let lost = |error: std::io::Error| Failure::Failed(lost(page, &error));
     stream.set_read_timeout(Some(ANSWERING)).map_err(lost)?;
     let length = body.len();
     let request =
@@ -167,15 +185,28 @@ fn overview(text: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::net::{Ipv4Addr, Ipv6Addr, TcpListener};
+
     use super::*;
 
     #[test]
     fn the_token_stays_on_this_machine() {
-        assert!(address("127.0.0.1:4861").is_ok());
-        assert!(address("localhost:4861").is_ok());
+        assert!(addresses("127.0.0.1:4861").is_ok());
+        assert!(addresses("localhost:4861").is_ok());
         for bad in ["192.0.2.1:4861", "127.0.0.1", "0.0.0.0:4861", ""] {
-            assert!(address(bad).is_err(), "{bad}");
+            assert!(addresses(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn each_address_of_this_machine_is_tried() {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a port");
+        let page = listener.local_addr().expect("an address");
+        let nobody = SocketAddr::from((Ipv6Addr::LOCALHOST, page.port()));
+        let (_, reached) = reach(&[nobody, page]).expect("the page");
+        assert_eq!(reached, page);
+        let refused = reach(&[nobody]).expect_err("nobody is there");
+        assert!(refused.to_string().contains(&nobody.to_string()));
     }
 
     #[test]
