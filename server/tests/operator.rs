@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpListener, TcpStream};
 use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
 
@@ -361,6 +361,31 @@ fn a_token_that_others_know_or_may_read_does_not_start() {
     place.write("workbench.toml", &format!("{before}[observers]{observers}"));
     let said = refusal(&place);
     assert!(said.contains("that of [observers]"), "{said}");
+}
+
+/// So that the same command starts when the port is free.
+#[test]
+fn a_page_whose_port_is_taken_leaves_no_recording() {
+    let place = Workplace::new();
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = taken.local_addr().expect("an address").port();
+    let text = with_token_file();
+    let (before, page) = text.split_once("[operator]").expect("a table");
+    let page = page.replacen("port = 0", &format!("port = {port}"), 1);
+    place.write("workbench.toml", &format!("{before}[operator]{page}"));
+    write_token(&place, TOKEN, 0o600);
+    let (recording, named) = (place.path("recording"), place.text("recording"));
+    for was_there in [false, true] {
+        if was_there {
+            std::fs::create_dir(&recording).expect("made");
+        }
+        let output = taut(&place.serve("workbench.toml", "1", &["--recording", &named]));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("[operator] cannot listen"), "{said}");
+        let left = std::fs::read_dir(&recording).map(Iterator::count).ok();
+        assert_eq!(left, was_there.then_some(0), "{said}");
+    }
 }
 
 /// `script` gives the server a terminal.

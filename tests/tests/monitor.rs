@@ -123,21 +123,27 @@ fn a_start_that_fails_leaves_no_recording() {
         workbench.set(key, 1000);
     }
     let path = workbench.directory().join("session.rrd");
-    let record = path.display().to_string();
+    let directory = workbench.directory().join("recording");
+    let [record, recording] = [&path, &directory].map(|path| path.display().to_string());
     let config = workbench.save().display().to_string();
     let key = workbench.key_path();
     let serve = ["serve", "--config", &config, "--key", &key];
-    let refused = workbench.run(
-        "refused",
-        &[&serve[..], &["--duration", "1", "--record", &record]].concat(),
-    );
+    let wanted = [
+        "--duration",
+        "1",
+        "--record",
+        &record,
+        "--recording",
+        &recording,
+    ];
+    let refused = workbench.run("refused", &[&serve[..], &wanted].concat());
     assert_eq!(refused.status.code(), Some(2), "{}", refused.stderr);
     assert!(
         refused.stderr.contains("enforces real time"),
         "{}",
         refused.stderr
     );
-    assert!(!path.exists());
+    assert!(!path.exists() && !directory.exists());
 }
 
 /// A device that pushes and cannot turn: whoever looks on is told, and sees what the hand feels.

@@ -89,7 +89,10 @@ impl Session {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
 
-        let (taps, recorder) = setup.recording.as_ref().map(record).transpose()?.unzip();
+        let mut fresh = FreshRecording::default(); // dropped after what writes it
+        let recording = setup.recording.as_ref();
+        let recording = recording.map(|wanted| record(wanted, &mut fresh));
+        let (taps, recorder) = recording.transpose()?.unzip();
         let fidelity = setup.fidelity.map(|plan| Fidelity {
             watch: Arc::new(FidelityWatch::new(&plan)),
             plan,
@@ -133,7 +136,6 @@ impl Session {
         let broadcaster = link.broadcaster();
         let (grant, awake) = keep_cores_awake();
         ledger.note("process", grant);
-        let mut fresh = FreshRecording::default(); // dropped after the session that writes it
         let mut session = Self {
             clock,
             started: clock.now(),
@@ -287,9 +289,16 @@ fn server_options(
     }
 }
 
-fn record(wanted: &RecordingSettings) -> Result<(Taps, Recorder), Failure> {
-    Recorder::start(&wanted.directory, wanted.manifest.clone(), &wanted.scene)
-        .map_err(Failure::bad_input)
+fn record(
+    wanted: &RecordingSettings,
+    fresh: &mut FreshRecording,
+) -> Result<(Taps, Recorder), Failure> {
+    let directory = &wanted.directory;
+    let is_new = !directory.exists();
+    let begun = Recorder::start(directory, wanted.manifest.clone(), &wanted.scene)
+        .map_err(Failure::bad_input)?;
+    fresh.filled(directory, is_new);
+    Ok(begun)
 }
 
 /// The device, and the commands that go to its bridge if it is behind the network.

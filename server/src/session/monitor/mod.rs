@@ -47,26 +47,35 @@ pub struct MonitorSettings {
     pub serve: bool,
 }
 
-/// The file of a session that has not begun: dropped as such, it is removed, and the next start finds its name free.
+/// The recordings of a session that has not begun: dropped as such, they are removed, and the next start finds their names free.
 #[derive(Debug, Default)]
-pub(crate) struct FreshRecording(Option<PathBuf>);
+pub(crate) struct FreshRecording(Vec<PathBuf>);
 
 impl FreshRecording {
     /// The file was made just now. What is none, such as a pipe, is left alone.
     pub(crate) fn made(&mut self, path: Option<&Path>) {
-        self.0 = path.filter(|path| path.is_file()).map(Path::to_path_buf);
+        let file = path.filter(|path| path.is_file());
+        self.0.extend(file.map(Path::to_path_buf));
     }
 
-    /// The session has begun: its file stays.
+    /// The files of this directory were made just now, and it itself where `is_new`.
+    pub(crate) fn filled(&mut self, directory: &Path, is_new: bool) {
+        let files = fs::read_dir(directory).into_iter().flatten().flatten();
+        self.0.extend(files.map(|file| file.path()));
+        self.0.extend(is_new.then(|| directory.to_path_buf()));
+    }
+
+    /// The session has begun: what it records stays.
     pub(crate) fn keep(&mut self) {
-        self.0 = None;
+        self.0.clear();
     }
 }
 
 impl Drop for FreshRecording {
     fn drop(&mut self) {
-        if let Some(path) = &self.0 {
-            let _ = fs::remove_file(path); // nobody is left to be told
+        for path in &self.0 {
+            // Nobody is left to be told. A directory goes only when it is empty.
+            let _ = fs::remove_file(path).or_else(|_| fs::remove_dir(path));
         }
     }
 }
