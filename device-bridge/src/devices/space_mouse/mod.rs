@@ -25,7 +25,7 @@ use crate::placement::Placement;
 const WAIT: Duration = Duration::from_millis(50);
 /// Between two attempts to open the device.
 const RETRY: Duration = Duration::from_millis(500);
-/// A deflected cap reports about every 16 ms; one that has been silent for this long is taken as let go.
+/// A deflected cap reports its motion about every 16 ms; one that has not for this long is taken as let go.
 const LET_GO_AFTER: Duration = Duration::from_millis(250);
 
 /// What the reading thread hands to the device loop.
@@ -33,8 +33,8 @@ const LET_GO_AFTER: Duration = Duration::from_millis(250);
 struct Newest {
     cap: CapState,
     is_open: bool,
-    /// Counts reports.
-    reports: u64,
+    /// Counts reports of motion: a button or the battery says nothing of how far the cap is deflected.
+    motions: u64,
 }
 
 /// The device. Dropping it ends its thread.
@@ -42,7 +42,7 @@ pub struct SpaceMouse {
     info: DeviceInfo,
     body: RateControl,
     newest: triple_buffer::Output<Newest>,
-    /// Reports seen, and when the last came, on the loop's clock.
+    /// Reports of motion seen, and when the last came, on the loop's clock.
     seen: (u64, Duration),
     was_open: bool,
     wrench: Vector6<f64>,
@@ -107,8 +107,8 @@ impl Device for SpaceMouse {
 
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
         let newest = *self.newest.read();
-        if newest.reports != self.seen.0 {
-            self.seen = (newest.reports, now);
+        if newest.motions != self.seen.0 {
+            self.seen = (newest.motions, now);
         }
         let silence = now.saturating_sub(self.seen.1);
         let held = newest.is_open && silence < LET_GO_AFTER;
@@ -180,7 +180,7 @@ fn read_reports(
                 // A report that is too short says nothing; the next one does.
                 if let Ok(report) = Report::parse(&buffer[..bytes.min(MAX_REPORT_BYTES)]) {
                     newest.cap.take(&report);
-                    newest.reports += 1;
+                    newest.motions += u64::from(report.is_motion());
                     output.write(newest);
                 }
             }
@@ -304,6 +304,44 @@ mod tests {
         let after = mouse.read(now).expect("open again");
         let drift = after.pose.translation.vector - still.pose.translation.vector;
         assert!(drift.norm() < 1e-6);
+    }
+
+    #[test]
+    fn a_button_and_the_battery_revive_no_deflection() {
+        let (ports, receiver) = channel();
+        let (device, host) = UnixDatagram::pair().expect("sockets");
+        ports.send(host).expect("open");
+        let placement = Placement::plain(Pose::translation(0.0, 0.0, 0.1), Point3::origin());
+        let mut mouse = SpaceMouse::open(
+            Box::new(FakePort(receiver)),
+            CapSettings::default(),
+            placement,
+        )
+        .expect("it is there");
+        let mut now = Duration::ZERO;
+        device.send(b"\x01\x5e\x01\0\0\0\0").expect("sent");
+        let _ = read_until(&mut mouse, &mut now, |s| {
+            s.as_ref().is_ok_and(|s| s.velocity[0] > 0.0)
+        });
+        // The cap is let go, but the report that would say so is lost.
+        for _ in 0..1000 {
+            now += Duration::from_millis(1);
+            let _ = mouse.read(now);
+        }
+        let still = mouse.read(now).expect("open").pose;
+
+        device.send(b"\x17\x64").expect("sent");
+        device.send(b"\x03\x01\0").expect("sent");
+        let _ = read_until(&mut mouse, &mut now, |s| {
+            s.as_ref().is_ok_and(|s| s.buttons == 1)
+        });
+        for _ in 0..100 {
+            now += Duration::from_millis(1);
+            let _ = mouse.read(now);
+        }
+        let after = mouse.read(now).expect("open").pose;
+        let moved = after.translation.vector - still.translation.vector;
+        assert!(moved.norm() < 1e-6, "{moved}");
     }
 
     #[test]

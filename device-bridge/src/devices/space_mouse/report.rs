@@ -71,6 +71,14 @@ impl Report {
             other => Ok(Report::Other(*other)),
         }
     }
+
+    /// Whether it says how far the cap is deflected.
+    pub(super) fn is_motion(&self) -> bool {
+        matches!(
+            self,
+            Report::Translation(_) | Report::Rotation(_) | Report::Motion { .. }
+        )
+    }
 }
 
 /// A report that is shorter than its first byte says.
