@@ -3,7 +3,7 @@
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
-use super::parts::{Files, bind, port};
+use super::parts::{Files, MIN_STATES, bind, port};
 use super::token::read_token;
 use crate::document::{Range, Section};
 
@@ -137,7 +137,7 @@ pub(super) fn vrpn(section: &Section<'_>) -> Vrpn {
             _ => default.bind,
         },
         port: port(section, "port", default.port),
-        rate: section.number_or("rate", Range::PositiveUpTo(MAX_RATE), default.rate),
+        rate: rate(section, MAX_RATE, default.rate),
         tracker: name(section, "tracker").unwrap_or(default.tracker),
         max_clients: most(section, "max_clients", default.max_clients),
     }
@@ -149,7 +149,7 @@ pub(super) fn observers(section: &Section<'_>, files: &Files<'_>) -> ObserverStr
         enabled: section.boolean("enabled").unwrap_or(false),
         bind: bind(section, default.bind).unwrap_or(default.bind),
         port: port(section, "port", default.port),
-        rate: section.number_or("rate", Range::PositiveUpTo(MAX_LINE_RATE), default.rate),
+        rate: rate(section, MAX_LINE_RATE, default.rate),
         token_file: files.path(section, "token_file"),
         max_observers: most(section, "max_observers", default.max_observers),
     };
@@ -174,7 +174,7 @@ pub(super) fn zenoh(section: &Section<'_>, files: &Files<'_>) -> Zenoh {
             .map(|(router, _)| router.to_owned())
             .collect(),
         config: files.path(section, "config"),
-        rate: section.number_or("rate", Range::PositiveUpTo(MAX_RATE), default.rate),
+        rate: rate(section, MAX_RATE, default.rate),
         ros: section.boolean("ros").unwrap_or(false),
         ros_domain: section
             .integer("ros_domain", 0, LAST_ROS_DOMAIN)
@@ -200,6 +200,11 @@ pub(super) fn zenoh(section: &Section<'_>, files: &Files<'_>) -> Zenoh {
         section.complain(section.at(), text);
     }
     zenoh
+}
+
+/// A state that did not change is told again once a second, and no rate is slower.
+fn rate(section: &Section<'_>, fastest: f64, default: f64) -> f64 {
+    section.number_or("rate", Range::Between(MIN_STATES, fastest), default)
 }
 
 fn most(section: &Section<'_>, key: &'static str, default: usize) -> usize {

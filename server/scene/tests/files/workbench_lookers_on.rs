@@ -86,6 +86,19 @@ fn slips_are_refused_with_what_to_do() {
 }
 
 #[test]
+fn no_rate_is_so_slow_that_its_period_is_no_time() {
+    for table in ["vrpn", "observers", "zenoh"] {
+        for rate in ["1e-300", "5e-20", "0.99"] {
+            let found = with(&[&format!("{table}.rate={rate}")]).expect_err(rate);
+            for wanted in ["`rate`", table, "between 1 and"] {
+                assert!(found.contains(wanted), "{found}");
+            }
+        }
+        with(&[&format!("{table}.rate=1")]).expect("the slowest");
+    }
+}
+
+#[test]
 fn a_token_is_read_from_its_file_and_a_poor_one_is_refused() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("observers.token");
