@@ -35,6 +35,21 @@ fn names_with_signs_are_words_of_the_scripts_and_units() {
     }
 }
 
+/// Its second line would be a setting of the unit.
+#[test]
+fn a_line_break_in_the_text_of_a_device_is_refused() {
+    let place = prepared();
+    let device = "simulated\nUser=root";
+    let mut table: Table = workbench().parse().expect("a workbench");
+    table["machine"][3]["device"] = device.into();
+    place.write("workbench.toml", &table.to_string());
+    let (code, said) = deploy(&place, &[]);
+    assert_eq!(code, Some(2), "{said}");
+    let why = format!("`taut bridge`: {device:?} has a control character");
+    assert!(said.contains(&why), "{said}");
+    assert!(!place.path("out").exists(), "{said}");
+}
+
 #[test]
 fn two_screens_of_one_machine_are_two_services_with_a_credential_each() {
     let place = prepared();

@@ -67,7 +67,7 @@ pub(super) fn units(
         ));
     }
     if let Some(device) = &machine.device {
-        let command = client.command("bridge", "device", &["--device", device]);
+        let command = client.command("bridge", "device", &["--device", device])?;
         let more = reached_by(device, machine)?;
         units.push(system(
             "taut-bridge.service",
@@ -75,7 +75,7 @@ pub(super) fn units(
         ));
     }
     if let Some(source) = &machine.tracker {
-        let command = client.command("track", "tracker", &["--source", source]);
+        let command = client.command("track", "tracker", &["--source", source])?;
         check_source(source, machine)?;
         units.push(system(
             "taut-track.service",
@@ -84,7 +84,7 @@ pub(super) fn units(
     }
     for node in &machine.nodes {
         let key = format!("render-{}", file_name(node));
-        let command = client.command("render", &key, &["--node", node]);
+        let command = client.command("render", &key, &["--node", node])?;
         units.push(Unit {
             name: format!("taut-{key}.service"),
             is_session: true,
@@ -107,27 +107,35 @@ struct Client {
 }
 
 impl Client {
-    fn command(&self, role: &str, key: &str, more: &[&str]) -> String {
+    fn command(&self, role: &str, key: &str, more: &[&str]) -> Result<String, Failure> {
         let mut command = format!(
             "taut {role} --server {} --key /etc/taut/{key}.key",
             self.server
         );
         for word in more {
             command.push(' ');
-            command.push_str(&quoted(word));
+            let word = quoted(word);
+            command.push_str(&word.map_err(|why| {
+                Failure::BadInput(format!("the service of `taut {role}`: {why}"))
+            })?);
         }
         if self.transport == TransportKind::QuicDatagram {
             command.push_str(" --transport quic");
         }
-        command + " --stay"
+        Ok(command + " --stay")
     }
 }
 
-/// A word of a command line in a unit: systemd expands `%` and `$`, and splits at blanks.
-fn quoted(word: &str) -> String {
+/// A word of a command line in a unit: systemd expands `%` and `$`, and splits at blanks. A line break would begin a setting of its own.
+fn quoted(word: &str) -> Result<String, String> {
+    if word.contains(char::is_control) {
+        return Err(format!(
+            "{word:?} has a control character, such as a line break, which a unit of systemd cannot hold; take it out"
+        ));
+    }
     let is_plain = |c: char| c.is_alphanumeric() || "-_.,:;/@=+".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) && !word.starts_with(';') {
-        return word.to_owned();
+        return Ok(word.to_owned());
     }
     let mut text = String::from("\"");
     for c in word.chars() {
@@ -138,7 +146,7 @@ fn quoted(word: &str) -> String {
         }
     }
     text.push('"');
-    text
+    Ok(text)
 }
 
 /// The unit of `docs/systemd` with its own command; how to install it by hand is left out.
@@ -185,21 +193,21 @@ pub(in crate::commands) fn reached_by_a_service(device: &str) -> Result<Vec<Stri
 
 /// What the unit must be allowed for this device.
 fn allowed(choice: &DeviceChoice) -> Result<Vec<String>, String> {
-    let on_serial = |port: &str| {
-        vec![
-            format!("DeviceAllow={} rw", quoted(port)),
+    let on_serial = |port: &str| -> Result<Vec<String>, String> {
+        Ok(vec![
+            format!("DeviceAllow={} rw", quoted(port)?),
             "SupplementaryGroups=dialout".to_owned(),
-        ]
+        ])
     };
     let lines: &[&str] = match choice {
         DeviceChoice::Mouse => {
             return Err("that is a render window's; run `taut render --hold` there by hand".into());
         }
         DeviceChoice::Input(InputChoice::Spidar(settings)) => {
-            return Ok(on_serial(&settings.path));
+            return on_serial(&settings.path);
         }
         DeviceChoice::Input(InputChoice::Polhem(settings)) => {
-            return Ok(on_serial(&settings.path));
+            return on_serial(&settings.path);
         }
         DeviceChoice::Input(InputChoice::SpaceMouse(_)) => ON_HID,
         #[cfg(unix)]
@@ -238,8 +246,19 @@ mod tests {
             ("100%", "\"100%%\""),
             ("a\"$b", "\"a\\\"$$b\""),
         ] {
-            assert_eq!(quoted(word), text);
+            assert_eq!(quoted(word).as_deref(), Ok(text));
         }
+    }
+
+    #[test]
+    fn words_that_would_begin_a_line_of_their_own_are_refused() {
+        for word in ["front\nExecStartPre=/bin/true", "front\r", "a\0b", "\u{85}"] {
+            let why = quoted(word).expect_err(word);
+            assert!(why.starts_with(&format!("{word:?} has")), "{why}");
+        }
+        let reached = reached_by_a_service("spidar:/dev/tty\nUser=root");
+        let why = reached.expect_err("two lines");
+        assert!(why.contains("control character"), "{why}");
     }
 
     #[test]
