@@ -167,7 +167,7 @@ fn scheduling(grant: &RealtimeGrant) -> Finding {
         RealtimeGrant::Waived { what, why } => Finding::lacking(
             WHAT,
             format!("{what} is not granted: {why}"),
-            "echo \"@realtime - rtprio 99\" | sudo tee /etc/security/limits.d/99-taut.conf && sudo groupadd -f realtime && sudo usermod -aG realtime $USER  # then log in again",
+            "echo \"@realtime - rtprio 99\" | sudo tee -a /etc/security/limits.d/99-taut.conf && sudo groupadd -f realtime && sudo usermod -aG realtime $USER  # then log in again",
         ),
     }
 }
@@ -288,6 +288,23 @@ mod tests {
             assert!(!finding.good && finding.mend.is_some(), "{finding:?}");
         }
         assert!(memory_lock(true, Some("65536".into())).good);
+    }
+
+    /// Both are lines of one file, in whatever order they are run.
+    #[test]
+    fn the_command_for_a_limit_keeps_the_lines_of_another() {
+        let waived = RealtimeGrant::Waived {
+            what: "SCHED_FIFO".into(),
+            why: "no".into(),
+        };
+        for finding in [
+            scheduling(&waived),
+            memory_lock(false, Some("65536".into())),
+        ] {
+            let mend = finding.mend.expect("a command");
+            let adds = "| sudo tee -a /etc/security/limits.d/99-taut.conf ";
+            assert!(mend.contains(adds), "{mend}");
+        }
     }
 
     #[test]
