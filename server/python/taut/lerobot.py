@@ -99,7 +99,7 @@ def _table(session, name):
     wanted |= {TIMES[name]: pa.int64()} | ({"faulty": pa.uint8()} if name == "haptics" else {})
     try:
         text = pa.memory_map(str(path)).read_buffer()
-        end = _whole_lines(path)
+        end = _whole_lines(text)
         options = pa.csv.ConvertOptions(column_types=wanted, include_columns=list(wanted))
         table = pa.csv.read_csv(pa.BufferReader(text.slice(0, end)), convert_options=options)
         columns = {column: table[column].to_numpy() for column in wanted}
@@ -112,16 +112,14 @@ def _table(session, name):
     return columns, text.size > end
 
 
-def _whole_lines(path):
-    """Bytes up to the end of the last line that has one."""
-    with open(path, "rb") as file:
-        end = file.seek(0, os.SEEK_END)
-        while end:
-            begin = max(0, end - 4096)
-            file.seek(begin)
-            if (found := file.read(end - begin).rfind(b"\n")) >= 0:
-                return begin + found + 1
-            end = begin
+def _whole_lines(text):
+    """Bytes up to the end of the last line that has one. Of what was mapped: a file that is still written to is longer by now."""
+    end = text.size
+    while end:
+        begin = max(0, end - 4096)
+        if (found := text.slice(begin, end - begin).to_pybytes().rfind(b"\n")) >= 0:
+            return begin + found + 1
+        end = begin
     return 0
 
 

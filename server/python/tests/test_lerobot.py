@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from unittest import mock
 
 import numpy as np
 import pandas
@@ -121,6 +122,21 @@ class LeRobot(unittest.TestCase):
         self.assertRegex(said, f"updates.csv: ends after {len(lines) // 2 - 1} records, but the session wrote {len(lines) - 1};")
         said = "\n".join(taut.lerobot.export([self.sessions[0]], self.place / "all"))
         self.assertNotIn("ends after", said)
+
+    def test_what_is_written_after_a_file_was_opened_is_not_read(self):
+        growing = self.place / "growing"
+        shutil.copytree(self.sessions[0], growing)
+        opened = pyarrow.memory_map
+
+        def opened_and_grown(path):
+            file = opened(path)
+            with open(path, "ab") as more:
+                more.write(b"7,1\n")
+            return file
+
+        with mock.patch("pyarrow.memory_map", opened_and_grown):
+            said = "\n".join(taut.lerobot.export([growing], self.place / "grown"))
+        self.assertNotRegex(said, "cut off|ends after")
 
     def test_what_cannot_be_exported_is_said_and_leaves_nothing(self):
         broken = self.place / "broken"
