@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use numpy::{AllowTypeChange, PyArrayLike1};
 use pyo3::prelude::*;
 use taut_link::{
     ClientLink, ClientOptions, LinkError, RejoinPolicy, Renewal, Role, SessionEnd, SupervisedLink,
@@ -14,7 +13,7 @@ use taut_link::{
 use taut_proto::ForceSample;
 use tokio::runtime::Runtime;
 
-use crate::convert::bad;
+use crate::convert::{VectorLike, bad, row_of};
 
 /// Names the key file where the caller names none, as for the program.
 const KEY_VARIABLE: &str = "TAUT_KEY_FILE";
@@ -61,7 +60,7 @@ impl PushWrench {
     }
 
     #[pyo3(signature = (wrench, age = 0.0))]
-    fn send(&self, wrench: PyArrayLike1<'_, f64, AllowTypeChange>, age: f64) -> PyResult<bool> {
+    fn send(&self, wrench: VectorLike<'_>, age: f64) -> PyResult<bool> {
         let wrench = six(&wrench)?;
         if !(0.0..=OLDEST).contains(&age) {
             return Err(bad(format!(
@@ -210,14 +209,13 @@ impl Source {
 }
 
 /// Six numbers that a server takes.
-fn six(wrench: &PyArrayLike1<'_, f64, AllowTypeChange>) -> PyResult<[f64; 6]> {
-    let view = wrench.as_array();
-    let numbers: Vec<f64> = view.iter().copied().collect();
-    let sound = numbers.iter().all(|x| x.abs() <= LARGEST); // false for NaN
-    match numbers.try_into() {
-        Ok(six) if sound => Ok(six),
+fn six(wrench: &VectorLike<'_>) -> PyResult<[f64; 6]> {
+    match row_of::<6>(wrench) {
+        // Not so for NaN.
+        Ok(six) if six.iter().all(|x| x.abs() <= LARGEST) => Ok(six),
         _ => Err(bad(format!(
-            "{view} is no wrench: give six numbers from -10^6 to 10^6, force x y z in N, then torque x y z in N m"
+            "{} is no wrench: give six numbers from -10^6 to 10^6, force x y z in N, then torque x y z in N m",
+            wrench.as_array()
         ))),
     }
 }

@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use taut_scene::{Runner, Scene};
 
-use crate::convert::{PoseLike, array_of, bad, bad_file, pose_of, table};
+use crate::convert::{VectorLike, array_of, bad, bad_file, pose_of, table};
 
 /// A scene that is stepped. Threads may share it: they take turns, without the interpreter's lock.
 #[pyclass(frozen, module = "taut")]
@@ -115,7 +115,7 @@ impl Simulation {
         Ok(array_of(py, &pose))
     }
 
-    fn update(&self, py: Python<'_>, device: PoseLike<'_>) -> PyResult<Update> {
+    fn update(&self, py: Python<'_>, device: VectorLike<'_>) -> PyResult<Update> {
         let device = pose_of(&device)?;
         let report = py.detach(|| Ok::<_, PyErr>(self.lock()?.update(&device)))?;
         Ok(Update {
@@ -130,7 +130,7 @@ impl Simulation {
         })
     }
 
-    fn force(&self, py: Python<'_>, time: f64, device: PoseLike<'_>) -> PyResult<Force> {
+    fn force(&self, py: Python<'_>, time: f64, device: VectorLike<'_>) -> PyResult<Force> {
         let device = pose_of(&device)?;
         let output = py.detach(|| {
             let mut runner = self.lock()?;
@@ -161,7 +161,7 @@ impl Simulation {
         table(py, rows, 7)
     }
 
-    fn move_obstacle(&self, py: Python<'_>, index: usize, target: PoseLike<'_>) -> PyResult<()> {
+    fn move_obstacle(&self, py: Python<'_>, index: usize, target: VectorLike<'_>) -> PyResult<()> {
         let target = pose_of(&target)?;
         py.detach(|| self.lock()?.move_obstacle(index, &target).map_err(bad))
     }

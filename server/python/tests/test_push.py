@@ -103,7 +103,7 @@ class Push(unittest.TestCase):
     def test_what_cannot_be_pushed_is_said(self):
         with Open(PATIENCE) as session:
             with session.pushing() as hand:
-                for bad in ([1, 2, 3], [float("nan")] * 6, [float("inf"), 0, 0, 0, 0, 0], [2e6, 0, 0, 0, 0, 0], range(7)):
+                for bad in ([1, 2, 3], [float("nan")] * 6, [float("inf"), 0, 0, 0, 0, 0], [2e6, 0, 0, 0, 0, 0], range(7), [[0] * 6]):
                     with self.subTest(bad), self.assertRaisesRegex(taut.TautError, "is no wrench: give six numbers"):
                         hand.send(bad)
                 for age in (-1, 2, float("nan")):

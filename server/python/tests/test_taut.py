@@ -151,6 +151,9 @@ class Steps(unittest.TestCase):
         cases = [
             (lambda: sim.update(nan), "finite"),
             (lambda: sim.update(sim.start[:3]), "7 numbers"),
+            (lambda: sim.update([sim.start]), r"7 numbers.* \[1, 7\]"),
+            (lambda: sim.force(2.0, sim.start[:, np.newaxis]), r"7 numbers.* \[7, 1\]"),
+            (lambda: sim.move_obstacle(0, 1.0), r"7 numbers.* \[\]"),
             (lambda: sim.update([0, 0, 0, 2, 0, 0, 0]), "norm 2"),
             (lambda: sim.force(0.5, sim.start), "never run back"),
             (lambda: sim.force(np.nan, sim.start), "the time is NaN"),
