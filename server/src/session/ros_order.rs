@@ -30,6 +30,10 @@ struct Source {
     sequence: i64,
     heard: Duration,
     quickest: f64,
+    /// Its stamp, ns of the sender's clock.
+    sent_ns: i64,
+    /// Whether a stamp was ever before that of an earlier message, which was told.
+    went_back: bool,
     /// Counts the publishers: that of a session, for the loop.
     number: u64,
 }
@@ -94,11 +98,20 @@ impl RosOrder {
                 }
                 let missing = step.unsigned_abs() - 1;
                 self.statistics.lost.fetch_add(missing, Ordering::Relaxed);
+                let went_back = attachment.sent_ns < source.sent_ns;
+                if went_back && !source.went_back {
+                    let by = source.sent_ns.abs_diff(attachment.sent_ns) as f64 * 1e-9;
+                    tracing::warn!(
+                        "the clock of the node of ROS 2 that sends forces went back by {by:.3} s: its values count as that much older; start the node anew"
+                    );
+                }
                 let passed = now.saturating_sub(source.heard).as_nanos() as f64;
                 Source {
                     sequence: attachment.sequence,
                     heard: now,
                     quickest: (source.quickest + DRIFT * passed).min(gap),
+                    sent_ns: attachment.sent_ns,
+                    went_back: source.went_back || went_back,
                     ..source
                 }
             }
@@ -108,6 +121,8 @@ impl RosOrder {
                 sequence: attachment.sequence,
                 heard: now,
                 quickest: gap,
+                sent_ns: attachment.sent_ns,
+                went_back: false,
                 number: before.map_or(0, |before| before.number) + 1,
             },
         };
@@ -219,6 +234,26 @@ mod tests {
         }
         // One from the far future made all after it old: nothing of them is felt until the publisher is another.
         assert!(newest(&mut output).1 > ms(1000));
+    }
+
+    #[test]
+    fn a_clock_that_goes_back_is_noticed_until_another_publisher_is_heard() {
+        let (mut order, mut output) = order();
+        let went_back = |order: &RosOrder| order.source.is_some_and(|source| source.went_back);
+        // One that is late has a late arrival, not an early stamp.
+        order.take(&came(1, 1, EPOCH_MS), ms(10));
+        order.take(&came(1, 2, EPOCH_MS + 1), ms(70));
+        assert!(!went_back(&order));
+        let hour_ago = EPOCH_MS - 3_600_000;
+        for sequence in [3, 4] {
+            let now = ms(77 + sequence.unsigned_abs());
+            order.take(&came(1, sequence, hour_ago + sequence), now);
+            assert!(went_back(&order));
+            assert_eq!(newest(&mut output), (sequence.unsigned_abs(), now));
+        }
+        order.take(&came(2, 1, hour_ago), ms(2000));
+        assert!(!went_back(&order));
+        assert_eq!(newest(&mut output), (1, Duration::ZERO));
     }
 
     #[test]
