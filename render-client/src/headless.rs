@@ -171,12 +171,21 @@ fn write_pictures(canvas: &Canvas, plan: &Plan, frame: u64) -> Result<(), Render
     Ok(())
 }
 
-/// A file name without characters that a file system or a shell might take for something else.
+/// A file name without characters that a file system or a shell might take for something else: each byte of such a character is `+` and two
+/// hexadecimal digits, so that no two names become one.
 pub(crate) fn plain(name: &str) -> String {
     let keep = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
-    name.chars()
-        .map(|c| if keep(c) { c } else { '_' })
-        .collect()
+    let mut plain = String::with_capacity(name.len());
+    for c in name.chars() {
+        if keep(c) {
+            plain.push(c);
+        } else {
+            let mut bytes = [0; 4];
+            let bytes = c.encode_utf8(&mut bytes).bytes();
+            plain.extend(bytes.map(|byte| format!("+{byte:02x}")));
+        }
+    }
+    plain
 }
 
 #[cfg(test)]
@@ -187,7 +196,25 @@ mod tests {
     fn a_picture_stays_in_its_folder_whatever_its_screen_is_called() {
         assert_eq!(
             plain("left-../../wall 1-00001.png"),
-            "left-.._.._wall_1-00001.png"
+            "left-..+2f..+2fwall+201-00001.png"
         );
+    }
+
+    #[test]
+    fn pictures_of_two_screens_never_have_one_name() {
+        let screens = [
+            "a b",
+            "a_b",
+            "a/b",
+            "a+b",
+            "a+20b",
+            "a\u{a0}b",
+            "a\u{2014}b",
+        ];
+        let names: std::collections::BTreeSet<String> =
+            screens.iter().map(|screen| plain(screen)).collect();
+        assert_eq!(names.len(), screens.len(), "{names:?}");
+        let safe = |c: char| c.is_alphanumeric() || "-_.+".contains(c);
+        assert!(names.iter().all(|name| name.chars().all(safe)), "{names:?}");
     }
 }
