@@ -6,6 +6,7 @@
 
 mod display;
 mod light;
+mod shown;
 pub(crate) mod still;
 
 use std::time::{Duration, Instant};
@@ -34,6 +35,7 @@ use crate::statistics::{Ended, NO_WINDOW, Statistics};
 use crate::timeline::{Latched, Timeline};
 use crate::view::Eyes;
 use display::{Display, Pane};
+use shown::Shown;
 
 /// Nothing to draw yet: how soon to look again.
 const MOMENT: Duration = Duration::from_millis(2);
@@ -74,7 +76,7 @@ pub(crate) fn run(
         session,
         timeline,
         statistics,
-        show: plan.show,
+        show: Shown::new(plan.show),
         plan,
         hand,
         mouse: Mouse::default(),
@@ -107,7 +109,7 @@ struct App<'a> {
     statistics: &'a mut Statistics,
     plan: Plan,
     stage: Stage,
-    show: Show,
+    show: Shown,
     hand: Option<Hand>,
     mouse: Mouse,
     /// As drawn last.
@@ -200,13 +202,8 @@ impl App<'_> {
                 let panes = self.screen.iter().flat_map(|screen| &screen.panes);
                 panes.for_each(|pane| toggle_fullscreen(&pane.window));
             }
-            KeyCode::KeyG => self.show.ghost = !self.show.ghost,
-            KeyCode::KeyC => self.show.contacts = !self.show.contacts,
-            KeyCode::KeyV => self.show.force = !self.show.force,
-            KeyCode::KeyH => self.show.hud = !self.show.hud,
-            KeyCode::KeyM => self.show.reflections = !self.show.reflections,
             KeyCode::KeyP | KeyCode::KeyR => self.let_go_or_return(code),
-            _ => {}
+            _ => self.show.key(code),
         }
         self.last_drawn = None;
     }
@@ -324,7 +321,7 @@ impl App<'_> {
             Turn::Renewed(other) => {
                 self.statistics.renewed();
                 if let Some(scene) = other {
-                    self.show = scene.1;
+                    self.show.follow(scene.1);
                     self.restage(events, scene.0)?;
                 }
                 self.pacer = None;
@@ -388,9 +385,10 @@ impl App<'_> {
             panes,
             light,
         } = screen;
-        renderer.set_state(gpu, &self.stage, &latched, self.show);
+        let show = self.show.now();
+        renderer.set_state(gpu, &self.stage, &latched, show);
         let status = pacer.complete(self.statistics.status(&self.plan.node, health));
-        renderer.set_overlay(Overlay::of(&status, latched.stale, self.show.hud));
+        renderer.set_overlay(Overlay::of(&status, latched.stale, show.hud));
         if !locked {
             // As late as can be: the head where it will be when the picture lights up. Screens that are shown together are drawn for
             // one head, which follows from their frame: a line across their edge would break otherwise.
