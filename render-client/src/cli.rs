@@ -15,6 +15,7 @@ use crate::error::RenderError;
 use crate::hand::Hand;
 use crate::hold::Hold;
 use crate::membership::MembershipArgs;
+use crate::monitor::Places;
 use crate::renderer::{Gpu, GpuChoice, SMOOTH};
 use crate::session::Session;
 use crate::stage::Stage;
@@ -205,7 +206,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
                 return Err(error);
             }
         };
-        let plan = window_plan(&args, &limits, &session, choice, show);
+        let plan = window_plan(&args, &limits, choice, show);
         window::run(
             &mut session,
             stage,
@@ -290,23 +291,15 @@ fn headless_plan(args: &RenderArgs, limits: &Limits, gpu: &Gpu, show: Show) -> h
     }
 }
 
-fn window_plan(
-    args: &RenderArgs,
-    limits: &Limits,
-    session: &Session,
-    gpu: GpuChoice,
-    show: Show,
-) -> window::Plan {
+fn window_plan(args: &RenderArgs, limits: &Limits, gpu: GpuChoice, show: Show) -> window::Plan {
     window::Plan {
         frames: args.frames,
         duration: limits.duration,
         frame_time: limits.frame_time(WINDOW_FPS),
         software_frame_time: limits.frame_time(SOFTWARE_FPS),
-        fullscreen: args.fullscreen || session.fullscreen(),
-        monitors: if args.monitor.is_empty() {
-            session.monitors()
-        } else {
-            args.monitor.clone()
+        asked: Places {
+            fullscreen: args.fullscreen,
+            monitors: args.monitor.clone(),
         },
         gpu,
         samples: args.samples,

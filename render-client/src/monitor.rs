@@ -2,7 +2,41 @@
 
 use std::collections::HashMap;
 
+use taut_proto::scene::NodeDescription;
+
 use crate::error::RenderError;
+
+/// Where the windows of a node are to be.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Places {
+    /// They cover their monitors.
+    pub(crate) fullscreen: bool,
+    /// Their monitors in order, by name or number; none leaves it to the window system.
+    pub(crate) monitors: Vec<String>,
+}
+
+impl Places {
+    /// As the workbench file says of a node.
+    pub(crate) fn of(node: &NodeDescription) -> Self {
+        let names = node.monitors.iter();
+        Self {
+            fullscreen: node.window.fullscreen,
+            monitors: names.map(|name| name.raw().to_owned()).collect(),
+        }
+    }
+
+    /// What these ask for; where they ask for nothing, `said`.
+    pub(crate) fn or(&self, said: Self) -> Self {
+        Self {
+            fullscreen: self.fullscreen || said.fullscreen,
+            monitors: if self.monitors.is_empty() {
+                said.monitors
+            } else {
+                self.monitors.clone()
+            },
+        }
+    }
+}
 
 /// The place, among the monitors there are, of window number `window`; `None` leaves it to the window system.
 ///
@@ -60,6 +94,7 @@ fn place_of(wanted: &str, known: &[Option<String>]) -> Result<usize, RenderError
 #[cfg(test)]
 mod tests {
     use super::*;
+    use taut_proto::scene::{Stereo, WindowDescription};
 
     fn known() -> Vec<Option<String>> {
         vec![Some("eDP-1".into()), Some("DP-1".into()), None]
@@ -85,6 +120,43 @@ mod tests {
         let mut columns = Columns::default();
         let begins = [Some(1), Some(2), Some(1), None, None].map(|on| columns.next(on, 1080));
         assert_eq!(begins, [0, 0, 1080, 0, 1080]);
+    }
+
+    #[test]
+    fn windows_opened_anew_are_where_the_changed_workbench_file_says() {
+        let mut node = NodeDescription {
+            name: "wall".into(),
+            screens: Vec::new(),
+            stereo: Stereo::Mono,
+            window: WindowDescription {
+                width: 960,
+                height: 640,
+                fullscreen: false,
+            },
+            monitors: vec!["DP-1".into()],
+        };
+        let places = |fullscreen, monitor: &str| Places {
+            fullscreen,
+            monitors: vec![monitor.to_owned()],
+        };
+        let nothing_asked = Places::default();
+        assert_eq!(
+            nothing_asked.or(Places::of(&node)),
+            places(false, "DP-1"),
+            "at the start"
+        );
+        node.window.fullscreen = true;
+        node.monitors = vec!["1".into()];
+        let changed = Places::of(&node);
+        assert_eq!(nothing_asked.or(changed.clone()), places(true, "1"));
+        // What the command line says comes first, each time.
+        let asked = places(false, "eDP-1");
+        assert_eq!(asked.or(changed), places(true, "eDP-1"));
+        let covering = Places {
+            fullscreen: true,
+            ..Places::default()
+        };
+        assert_eq!(covering.or(Places::default()), covering);
     }
 
     #[test]

@@ -15,6 +15,7 @@ use taut_proto::{ClientStats, HotState, Role, SceneDescription};
 
 use crate::description::{self, Overrides};
 use crate::error::RenderError;
+use crate::monitor::Places;
 use crate::node_status::LinkHealth;
 use crate::stage::Stage;
 use crate::timeline::{Contact, Head, State, Timeline};
@@ -187,21 +188,11 @@ impl Session {
         self.link.mesh_counters()
     }
 
-    /// Whether the scene's window is to cover its monitor.
-    pub(crate) fn fullscreen(&self) -> bool {
+    /// Where the newest scene wants the node's windows.
+    pub(crate) fn places(&self) -> Places {
         description::find_node(self.link.description(), &self.node)
-            .is_ok_and(|node| node.window.fullscreen)
-    }
-
-    /// The monitors that the node's windows cover, in order: names or numbers.
-    pub(crate) fn monitors(&self) -> Vec<String> {
-        description::find_node(self.link.description(), &self.node).map_or_else(
-            |_| Vec::new(),
-            |node| {
-                let names = node.monitors.iter();
-                names.map(|name| name.raw().to_owned()).collect()
-            },
-        )
+            .map(Places::of)
+            .unwrap_or_default()
     }
 
     /// Moves the states that have arrived to the timeline.

@@ -25,6 +25,7 @@ use crate::error::RenderError;
 use crate::hand::Hand;
 use crate::headless::shown;
 use crate::hud::Overlay;
+use crate::monitor::Places;
 use crate::mouse::{Mouse, Pointed};
 use crate::node_status::LinkHealth;
 use crate::pacing::Pacer;
@@ -48,9 +49,8 @@ pub(crate) struct Plan {
     pub(crate) frame_time: Duration,
     /// Least time between frames where the processor draws.
     pub(crate) software_frame_time: Duration,
-    pub(crate) fullscreen: bool,
-    /// The monitors of the windows in order, by name or number.
-    pub(crate) monitors: Vec<String>,
+    /// Where the windows are asked to be, whatever the server says.
+    pub(crate) asked: Places,
     pub(crate) gpu: GpuChoice,
     /// Samples per pixel, where they are asked for.
     pub(crate) samples: Option<u32>,
@@ -142,7 +142,7 @@ impl ApplicationHandler for App<'_> {
         if self.screen.is_some() {
             return;
         }
-        match Display::open(events, &self.stage, &self.plan, self.hand.is_some()) {
+        match self.open(events) {
             Ok(screen) => {
                 if screen.gpu.is_software() {
                     let slower = self.plan.software_frame_time;
@@ -260,11 +260,17 @@ impl App<'_> {
             Some(screen) if same => screen.restage(&self.stage),
             _ => {
                 self.screen = None; // its windows close before the new ones open
-                let holds = self.hand.is_some();
-                self.screen = Some(Display::open(events, &self.stage, &self.plan, holds)?);
+                self.screen = Some(self.open(events)?);
             }
         }
         Ok(())
+    }
+
+    /// Opens windows where they are asked to be, or else where the scene of this session says.
+    fn open(&self, events: &ActiveEventLoop) -> Result<Display, RenderError> {
+        let places = self.plan.asked.or(self.session.places());
+        let holds = self.hand.is_some();
+        Display::open(events, &self.stage, &self.plan, &places, holds)
     }
 
     /// What the window system has told of the light of earlier frames.

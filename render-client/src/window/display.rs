@@ -11,7 +11,7 @@ use super::Plan;
 use super::light::{Light, NoFeedback};
 use crate::canvas::target_of;
 use crate::error::RenderError;
-use crate::monitor;
+use crate::monitor::{self, Places};
 use crate::mouse;
 use crate::renderer::{Gpu, PictureTarget, Renderer, new_instance};
 use crate::stage::Stage;
@@ -42,11 +42,12 @@ pub(super) struct Pane {
 }
 
 impl Display {
-    /// Opens the windows of the stage where the plan wants them.
+    /// Opens the windows of the stage at their places.
     pub(super) fn open(
         events: &ActiveEventLoop,
         stage: &Stage,
         plan: &Plan,
+        places: &Places,
         holds: bool,
     ) -> Result<Self, RenderError> {
         let help = if holds {
@@ -62,10 +63,10 @@ impl Display {
         for (index, screen) in stage.screens.iter().enumerate() {
             for (eye, picture) in Picture::of(screen.stereo).into_iter().enumerate() {
                 let (width, height) = screen.pixels;
-                let place = monitor::of_window(opened.len(), &plan.monitors, &names)?;
+                let place = monitor::of_window(opened.len(), &places.monitors, &names)?;
                 let monitor = place.and_then(|place| monitors.get(place).cloned());
                 // A monitor that was asked for is where the window opens, even if it does not cover it.
-                let named = place.filter(|_| !plan.monitors.is_empty());
+                let named = place.filter(|_| !places.monitors.is_empty());
                 let corner = named
                     .and_then(|place| monitors.get(place))
                     .map_or(PhysicalPosition::new(0, 0), MonitorHandle::position);
@@ -75,7 +76,7 @@ impl Display {
                     .with_title(format!("taut: {}{}{help}", screen.name, picture.suffix))
                     .with_inner_size(PhysicalSize::new(width, height))
                     .with_position(PhysicalPosition::new(corner.x, corner.y + below as i32))
-                    .with_fullscreen(plan.fullscreen.then(cover));
+                    .with_fullscreen(places.fullscreen.then(cover));
                 let window = events
                     .create_window(attributes)
                     .map_err(|error| missing(&error))?;

@@ -14,6 +14,7 @@ use super::{Plan, toggle_fullscreen};
 use crate::calibrate::CalibrationWindows;
 use crate::canvas::eyes_of;
 use crate::error::RenderError;
+use crate::monitor::Places;
 use crate::preview::at_start;
 use crate::renderer::SMOOTH;
 use crate::stage::Stage;
@@ -33,8 +34,10 @@ pub(crate) fn show(
             duration: None,
             frame_time: Duration::ZERO,
             software_frame_time: Duration::ZERO,
-            fullscreen: windows.fullscreen,
-            monitors: windows.monitors.clone(),
+            asked: Places {
+                fullscreen: windows.fullscreen,
+                monitors: windows.monitors.clone(),
+            },
             gpu: windows.gpu.clone(),
             samples: Some(SMOOTH), // it stands still
             display_ns: 0,
@@ -61,7 +64,9 @@ impl ApplicationHandler for Still {
             return;
         }
         events.set_control_flow(ControlFlow::Wait);
-        let opened = Display::open(events, &self.stage, &self.plan, false).map(|mut display| {
+        let places = &self.plan.asked;
+        let opened = Display::open(events, &self.stage, &self.plan, places, false);
+        let opened = opened.map(|mut display| {
             let at_start = at_start(&self.stage);
             let show = self.plan.show;
             display
