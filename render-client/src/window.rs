@@ -35,7 +35,7 @@ use crate::stage::Stage;
 use crate::statistics::{Ended, NO_WINDOW, Statistics};
 use crate::timeline::{Latched, Timeline};
 use crate::view::Eyes;
-use display::{Display, Pane};
+use display::{Display, Next, Pane};
 use shown::Shown;
 
 /// Nothing to draw yet: how soon to look again.
@@ -407,7 +407,7 @@ impl App<'_> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut textures = Vec::with_capacity(panes.len());
         for (place, pane) in panes.iter().enumerate() {
-            let Some(texture) = pane.texture(gpu)? else {
+            let Next::Texture(texture) = pane.texture(gpu)? else {
                 continue;
             };
             let view = pane.view(&texture);

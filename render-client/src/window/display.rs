@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use wgpu::CurrentSurfaceTexture;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event_loop::ActiveEventLoop;
 use winit::monitor::MonitorHandle;
@@ -39,6 +40,15 @@ pub(super) struct Pane {
     pub(super) target: PictureTarget,
     /// Place of the screen in the stage.
     pub(super) screen: usize,
+}
+
+/// What a window has to draw to.
+pub(super) enum Next {
+    Texture(wgpu::SurfaceTexture),
+    /// Nothing became free within a second, for which this was waited.
+    Busy,
+    /// The window is hidden or changes: the window system tells when it is to be drawn again.
+    Hidden,
 }
 
 impl Display {
@@ -183,22 +193,42 @@ impl Pane {
         })
     }
 
-    /// What to draw to next; `None` while the window is hidden or changes.
-    pub(super) fn texture(&self, gpu: &Gpu) -> Result<Option<wgpu::SurfaceTexture>, RenderError> {
-        match self.surface.get_current_texture() {
-            wgpu::CurrentSurfaceTexture::Success(texture) => Ok(Some(texture)),
-            wgpu::CurrentSurfaceTexture::Suboptimal(texture) => Ok(Some(texture)),
-            wgpu::CurrentSurfaceTexture::Timeout | wgpu::CurrentSurfaceTexture::Occluded => {
-                Ok(None)
-            }
-            wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
-                self.surface.configure(&gpu.device, &self.config);
-                Ok(None)
-            }
-            wgpu::CurrentSurfaceTexture::Validation => {
-                Err(gpu.broken(&"the window's surface is invalid"))
-            }
+    /// What to draw to next.
+    pub(super) fn texture(&self, gpu: &Gpu) -> Result<Next, RenderError> {
+        let acquired = acquire(
+            || self.surface.get_current_texture(),
+            || self.surface.configure(&gpu.device, &self.config),
+        );
+        Next::of(acquired).ok_or_else(|| gpu.broken(&"the window's surface is invalid"))
+    }
+}
+
+impl Next {
+    /// `None` where the surface is invalid.
+    fn of(acquired: CurrentSurfaceTexture) -> Option<Self> {
+        match acquired {
+            CurrentSurfaceTexture::Success(texture)
+            | CurrentSurfaceTexture::Suboptimal(texture) => Some(Self::Texture(texture)),
+            CurrentSurfaceTexture::Timeout => Some(Self::Busy),
+            CurrentSurfaceTexture::Occluded
+            | CurrentSurfaceTexture::Outdated
+            | CurrentSurfaceTexture::Lost => Some(Self::Hidden),
+            CurrentSurfaceTexture::Validation => None,
         }
+    }
+}
+
+/// The next texture of a surface, which is configured anew if it does not fit its window any more. Once: that of a hidden window may never fit.
+fn acquire(
+    mut next: impl FnMut() -> CurrentSurfaceTexture,
+    configure: impl FnOnce(),
+) -> CurrentSurfaceTexture {
+    match next() {
+        CurrentSurfaceTexture::Outdated | CurrentSurfaceTexture::Lost => {
+            configure();
+            next()
+        }
+        acquired => acquired,
     }
 }
 
@@ -273,6 +303,36 @@ mod tests {
         );
         let few = [Immediate, FifoRelaxed, Fifo];
         assert_eq!([0, 1].map(|place| present_mode(place, &few)), [Fifo, Fifo]);
+    }
+
+    /// How often a surface that always answers so is asked and configured.
+    fn tries(answer: fn() -> CurrentSurfaceTexture) -> (u32, u32) {
+        let (mut asked, mut configured) = (0, 0);
+        let next = || {
+            asked += 1;
+            answer()
+        };
+        let _ = acquire(next, || configured += 1);
+        (asked, configured)
+    }
+
+    #[test]
+    fn a_hidden_window_is_not_asked_again_and_again() {
+        let unfit: [fn() -> CurrentSurfaceTexture; 2] = [
+            || CurrentSurfaceTexture::Outdated,
+            || CurrentSurfaceTexture::Lost,
+        ];
+        for unfit in unfit {
+            assert_eq!(tries(unfit), (2, 1));
+            assert!(matches!(Next::of(unfit()), Some(Next::Hidden)));
+        }
+        assert_eq!(tries(|| CurrentSurfaceTexture::Occluded), (1, 0));
+        let occluded = Next::of(CurrentSurfaceTexture::Occluded);
+        assert!(matches!(occluded, Some(Next::Hidden)));
+        assert_eq!(tries(|| CurrentSurfaceTexture::Timeout), (1, 0));
+        let late = Next::of(CurrentSurfaceTexture::Timeout);
+        assert!(matches!(late, Some(Next::Busy)));
+        assert!(Next::of(CurrentSurfaceTexture::Validation).is_none());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::WindowId;
 
-use super::display::{self, Display};
+use super::display::{self, Display, Next};
 use super::{Plan, toggle_fullscreen};
 use crate::calibrate::CalibrationWindows;
 use crate::canvas::eyes_of;
@@ -103,10 +103,10 @@ impl ApplicationHandler for Still {
             WindowEvent::Resized(size) => {
                 if let Some(display) = &mut self.display {
                     display.resize(&self.stage, id, size);
-                    let pane = display.panes.iter().find(|pane| pane.window.id() == id);
-                    pane.iter().for_each(|pane| pane.window.request_redraw());
                 }
+                self.ask(id);
             }
+            WindowEvent::Occluded(false) => self.ask(id),
             WindowEvent::RedrawRequested => {
                 if let Err(error) = self.draw(id) {
                     self.end(events, Err(error));
@@ -125,6 +125,14 @@ impl Still {
         events.exit();
     }
 
+    /// Has a window drawn again.
+    fn ask(&self, id: WindowId) {
+        let mut panes = self.display.iter().flat_map(|display| &display.panes);
+        if let Some(pane) = panes.find(|pane| pane.window.id() == id) {
+            pane.window.request_redraw();
+        }
+    }
+
     fn draw(&mut self, id: WindowId) -> Result<(), RenderError> {
         let Some(Display {
             gpu,
@@ -136,9 +144,13 @@ impl Still {
             return Ok(());
         };
         for pane in panes.iter().filter(|pane| pane.window.id() == id) {
-            let Some(texture) = pane.texture(gpu)? else {
-                pane.window.request_redraw(); // it was configured anew, or is hidden
-                continue;
+            let texture = match pane.texture(gpu)? {
+                Next::Texture(texture) => texture,
+                Next::Busy => {
+                    pane.window.request_redraw();
+                    continue;
+                }
+                Next::Hidden => continue, // its window asks when it is seen again
             };
             let view = texture.texture.create_view(&wgpu::TextureViewDescriptor {
                 format: Some(pane.format),
