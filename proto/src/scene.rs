@@ -193,8 +193,8 @@ impl Stereo {
     /// Size of the picture, in pixels, that gives each eye `width` × `height`.
     pub fn picture_size(self, (width, height): (u32, u32)) -> (u32, u32) {
         match self {
-            Self::SideBySide => (2 * width, height),
-            Self::TopBottom => (width, 2 * height),
+            Self::SideBySide => (width.saturating_mul(2), height),
+            Self::TopBottom => (width, height.saturating_mul(2)),
             Self::Mono | Self::Anaglyph | Self::TwoWindows => (width, height),
         }
     }

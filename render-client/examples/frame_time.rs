@@ -58,7 +58,7 @@ fn main() -> anyhow::Result<()> {
             );
         }
         let start = Instant::now();
-        let canvas = Canvas::new(gpu, stage);
+        let canvas = Canvas::new(gpu, stage)?;
         canvas.gpu().finish()?;
         let ready = start.elapsed().as_secs_f64();
         rows.push((triangles, ready, canvas, [vec![], vec![], vec![], vec![]]));

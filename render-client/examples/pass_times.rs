@@ -59,7 +59,7 @@ fn row(gpu: Gpu, order: &str, mesh: TriangleMesh, frames: usize) -> anyhow::Resu
     stage.workbench_from_scene = Similarity3::new([0.0, -0.28, 0.3].into(), [0.0; 3].into(), 7.0);
     stage.meshes[1] = Arc::new(mesh);
     let begun = Instant::now();
-    let mut canvas = Canvas::new(gpu, stage);
+    let mut canvas = Canvas::new(gpu, stage)?;
     canvas.gpu().finish()?;
     let ready = begun.elapsed().as_secs_f64();
     let begun = Instant::now();

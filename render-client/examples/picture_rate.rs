@@ -41,7 +41,7 @@ fn main() -> anyhow::Result<()> {
                 }
                 rows.push(Row {
                     what: format!("{name:8} 2 x {width} x {height}   {samples}"),
-                    canvas: Canvas::new(gpu, stage),
+                    canvas: Canvas::new(gpu, stage)?,
                     wall: Vec::new(),
                     processor: Vec::new(),
                 });

@@ -83,7 +83,7 @@ impl Calibration {
 
     /// File name (node, screen, and eye where it has a picture of its own) and bytes of each picture, as PNG.
     pub fn pictures(&self, gpu: Gpu) -> Result<Vec<(PathBuf, Vec<u8>)>, RenderError> {
-        let mut canvas = Canvas::new(gpu, self.stage.clone());
+        let mut canvas = Canvas::new(gpu, self.stage.clone())?;
         canvas.draw(&at_start(&self.stage), Show::default(), true)?;
         let images = canvas.images()?;
         let png = |(name, image): (&str, image::RgbaImage)| {

@@ -9,6 +9,7 @@ use crate::node_status::NodeStatus;
 use crate::renderer::{Corrected, Gpu, OffScreen, PictureTarget, Renderer};
 use crate::stage::{Stage, StageScreen};
 use crate::stereo::Picture;
+use crate::texture_limits::picture_size;
 use crate::timeline::Latched;
 use crate::view::Eyes;
 
@@ -33,31 +34,30 @@ struct Sheet {
 }
 
 impl Canvas {
-    /// Makes ready to draw all screens of `stage`.
-    pub fn new(gpu: Gpu, stage: Stage) -> Self {
-        let (renderer, sheets) = Self::make(&gpu, &stage);
-        Self {
+    /// Makes ready to draw all screens of `stage`; refuses one whose pictures are larger than the adapter holds.
+    pub fn new(gpu: Gpu, stage: Stage) -> Result<Self, RenderError> {
+        let (renderer, sheets) = Self::make(&gpu, &stage)?;
+        Ok(Self {
             gpu,
             stage,
             renderer,
             sheets,
             status: NodeStatus::default(),
-        }
+        })
     }
 
-    /// Draws another stage from now on.
-    pub fn restage(&mut self, stage: Stage) {
-        (self.renderer, self.sheets) = Self::make(&self.gpu, &stage);
+    /// Draws another stage from now on; refuses one as [`Self::new`] does.
+    pub fn restage(&mut self, stage: Stage) -> Result<(), RenderError> {
+        (self.renderer, self.sheets) = Self::make(&self.gpu, &stage)?;
         self.stage = stage;
+        Ok(())
     }
 
-    fn make(gpu: &Gpu, stage: &Stage) -> (Renderer, Vec<Sheet>) {
+    fn make(gpu: &Gpu, stage: &Stage) -> Result<(Renderer, Vec<Sheet>), RenderError> {
         let renderer = Renderer::new(gpu, stage, OffScreen::FORMAT);
         let mut sheets = Vec::new();
         for (index, screen) in stage.screens.iter().enumerate() {
-            let most = gpu.device.limits().max_texture_dimension_2d;
-            let (width, height) = screen.stereo.picture_size(screen.pixels);
-            let size = (width.clamp(1, most), height.clamp(1, most));
+            let size = picture_size(screen, gpu.longest_side())?;
             let pictures = Picture::of(screen.stereo);
             sheets.extend(pictures.iter().enumerate().map(|(place, picture)| Sheet {
                 screen: index,
@@ -66,7 +66,7 @@ impl Canvas {
                 image: OffScreen::new(gpu, size),
             }));
         }
-        (renderer, sheets)
+        Ok((renderer, sheets))
     }
 
     /// Sets what the pictures to come say of the node.

@@ -189,15 +189,17 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
             present_timing: NO_WINDOW.to_owned(),
         };
         let plan = headless_plan(&args, &limits, &gpu, show);
-        let mut canvas = Canvas::new(gpu, stage);
-        headless::run(
-            &mut session,
-            &mut canvas,
-            &mut timeline,
-            &mut statistics,
-            &plan,
-        )
-        .map(|ended| (ended, drawn_with))
+        Canvas::new(gpu, stage)
+            .and_then(|mut canvas| {
+                headless::run(
+                    &mut session,
+                    &mut canvas,
+                    &mut timeline,
+                    &mut statistics,
+                    &plan,
+                )
+            })
+            .map(|ended| (ended, drawn_with))
     } else {
         let hand = match hand(&args, &stage) {
             Ok(hand) => hand,

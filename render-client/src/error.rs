@@ -121,6 +121,22 @@ pub enum RenderError {
         /// What is wrong, with the file's name and what to do.
         what: String,
     },
+    /// The graphics adapter does not hold it.
+    #[error(
+        "{what} has {width}x{height} pixels, but the graphics adapter holds {most} each way at most; {remedy}"
+    )]
+    TooLarge {
+        /// What it is, with its name.
+        what: String,
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+        /// Longest side that the adapter holds, pixels.
+        most: u32,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// The scene's description has a value that cannot be drawn.
     #[error(
         "the server's scene cannot be drawn: {what}; correct the scene or workbench file on the server"
@@ -158,7 +174,7 @@ impl RenderError {
         match self {
             Self::Option { .. } | Self::UnknownNode { .. } | Self::UnknownScreen { .. } => 2,
             Self::BadScreen { .. } | Self::BadScene { .. } | Self::MeshCache { .. } => 2,
-            Self::ScreenFile { .. } => 2,
+            Self::ScreenFile { .. } | Self::TooLarge { .. } => 2,
             Self::UnknownGpu { .. } | Self::UnknownMonitor { .. } => 2,
             // A wrong key, a name that does not resolve, a server that does not answer.
             Self::Link(error) => match error {

@@ -59,7 +59,7 @@ pub(crate) fn run(
             Turn::Renewed(other) => {
                 statistics.renewed();
                 if let Some(scene) = other {
-                    canvas.restage(scene.0);
+                    canvas.restage(scene.0)?;
                     show = scene.1;
                 }
                 pacer = Pacer::new(session, plan.frame_time, plan.display_ns);

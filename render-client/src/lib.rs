@@ -36,6 +36,7 @@ pub mod stage;
 pub mod statistics;
 pub mod stereo;
 mod studio;
+mod texture_limits;
 pub mod timeline;
 pub mod view;
 mod window;

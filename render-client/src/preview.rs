@@ -76,7 +76,7 @@ impl Preview {
         size: (u32, u32),
         views: u32,
     ) -> Result<Self, RenderError> {
-        let most = gpu.device.limits().max_texture_dimension_2d.min(Self::MOST);
+        let most = gpu.longest_side().min(Self::MOST);
         if !(1..=most).contains(&size.0) || !(1..=most).contains(&size.1) {
             return Err(RenderError::Option {
                 option: "--size",

@@ -218,7 +218,8 @@ fn a_picture_of_one_sample_differs_at_its_edges_alone() {
         return; // said by the others
     };
     let at = half_way_in();
-    let mut rough = Canvas::new(gpu.with_samples(1), raised(PIXELS, Stereo::TwoWindows));
+    let stage = raised(PIXELS, Stereo::TwoWindows);
+    let mut rough = Canvas::new(gpu.with_samples(1), stage).expect("the adapter holds it");
     rough.draw(&at, Show::default(), true).expect("drawn");
     let rough = rough.images().expect("read back");
     let smooth = plain(raised(PIXELS, Stereo::TwoWindows)).expect("as before");

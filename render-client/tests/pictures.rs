@@ -103,7 +103,7 @@ fn the_adapter_tells_how_long_it_took_for_each_pass() {
     }
     let mut stage = peg_in_hole(PIXELS, Stereo::Anaglyph);
     stage.screens.truncate(1);
-    let mut canvas = Canvas::new(gpu, stage);
+    let mut canvas = Canvas::new(gpu, stage).expect("the adapter holds it");
     let drawing = ["picture", "picture", "anaglyph"];
     let mut hand = 0.0;
     for shadows in [

@@ -250,6 +250,11 @@ impl Gpu {
         }
     }
 
+    /// Longest side of a picture that the adapter holds, pixels.
+    pub(crate) fn longest_side(&self) -> u32 {
+        self.device.limits().max_texture_dimension_2d
+    }
+
     /// Whether the processor draws, for want of a graphics card.
     pub fn is_software(&self) -> bool {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu

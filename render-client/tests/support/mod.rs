@@ -132,7 +132,7 @@ pub(crate) fn state(pose: Isometry3<f64>) -> Latched {
 /// A canvas for the stage; `None`, said aloud, on a machine without a graphics adapter.
 pub(crate) fn canvas(stage: Stage) -> Option<Canvas> {
     match Gpu::open() {
-        Ok(gpu) => Some(Canvas::new(gpu, stage)),
+        Ok(gpu) => Some(Canvas::new(gpu, stage).expect("the adapter holds it")),
         Err(error) => {
             taut_test_kit::left_out(error);
             None

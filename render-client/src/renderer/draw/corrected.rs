@@ -25,7 +25,7 @@ impl Renderer {
             self.picture(gpu, picture, (1, 1))
         };
         target.size = size;
-        let most = gpu.device.limits().max_texture_dimension_2d;
+        let most = gpu.longest_side();
         let sampling = corrected.correction.sampling;
         let sampled = |pixels: u32| ((f64::from(pixels) * sampling).round() as u32).clamp(1, most);
         let scene = |view: &ViewTarget| {
