@@ -9,7 +9,7 @@ use crate::node_status::NodeStatus;
 use crate::renderer::{Corrected, Gpu, OffScreen, PictureTarget, Renderer};
 use crate::stage::{Stage, StageScreen};
 use crate::stereo::Picture;
-use crate::texture_limits::picture_size;
+use crate::texture_limits::{check_masks, picture_size};
 use crate::timeline::Latched;
 use crate::view::Eyes;
 
@@ -34,7 +34,7 @@ struct Sheet {
 }
 
 impl Canvas {
-    /// Makes ready to draw all screens of `stage`; refuses one whose pictures are larger than the adapter holds.
+    /// Makes ready to draw all screens of `stage`; refuses one whose pictures or blend masks are larger than the adapter holds.
     pub fn new(gpu: Gpu, stage: Stage) -> Result<Self, RenderError> {
         let (renderer, sheets) = Self::make(&gpu, &stage)?;
         Ok(Self {
@@ -54,6 +54,7 @@ impl Canvas {
     }
 
     fn make(gpu: &Gpu, stage: &Stage) -> Result<(Renderer, Vec<Sheet>), RenderError> {
+        check_masks(stage, gpu.longest_side())?;
         let renderer = Renderer::new(gpu, stage, OffScreen::FORMAT);
         let mut sheets = Vec::new();
         for (index, screen) in stage.screens.iter().enumerate() {

@@ -33,6 +33,8 @@ pub struct Correction {
     pub meshes: Vec<Arc<OutputMesh>>,
     /// The light that each pixel keeps; none keeps all.
     pub masks: Vec<Arc<Mask>>,
+    /// Names of the files of `masks`, for people; none where they are of no file.
+    pub mask_files: Vec<String>,
     /// Light sent for light wanted, linear red, green and blue.
     pub colour: Matrix3<f64>,
     /// Exponents of the responses of red, green and blue, light over signal; 0 is that of sRGB.
@@ -47,6 +49,7 @@ impl Default for Correction {
         Self {
             meshes: Vec::new(),
             masks: Vec::new(),
+            mask_files: Vec::new(),
             colour: Matrix3::identity(),
             gamma: Vector3::zeros(),
             sampling: 1.0,
@@ -75,6 +78,7 @@ impl Correction {
             masks: each(&described.blend, folder, &["png", "pfm"], |path| {
                 read_blend(path, described.blend_gamma)
             })?,
+            mask_files: described.blend.iter().map(Untrusted::to_string).collect(),
             colour: Matrix3::from_row_slice(&described.colour),
             gamma: Vector3::from(described.gamma),
             sampling: described.sampling,

@@ -257,7 +257,7 @@ impl App<'_> {
             hand.follow(&self.stage, self.mouse.buttons());
         }
         match &mut self.screen {
-            Some(screen) if same => screen.restage(&self.stage),
+            Some(screen) if same => screen.restage(&self.stage)?,
             _ => {
                 self.screen = None; // its windows close before the new ones open
                 self.screen = Some(self.open(events)?);

@@ -17,6 +17,7 @@ use crate::mouse;
 use crate::renderer::{Gpu, PictureTarget, Renderer, new_instance};
 use crate::stage::Stage;
 use crate::stereo::Picture;
+use crate::texture_limits::check_masks;
 
 /// The windows and what draws in them.
 pub(super) struct Display {
@@ -103,6 +104,7 @@ impl Display {
             &plan.gpu,
         )?
         .smoothed(plan.samples, false);
+        check_masks(stage, gpu.longest_side())?;
         let mut renderer: Option<Renderer> = None;
         let mut panes = Vec::new();
         for ((screen, place), picture, window, surface) in opened {
@@ -148,15 +150,17 @@ impl Display {
     }
 
     /// Draws another stage in the same windows.
-    pub(super) fn restage(&mut self, stage: &Stage) {
+    pub(super) fn restage(&mut self, stage: &Stage) -> Result<(), RenderError> {
         let Some(format) = self.panes.first().map(|pane| pane.format) else {
-            return;
+            return Ok(());
         };
+        check_masks(stage, self.gpu.longest_side())?;
         self.renderer = Renderer::new(&self.gpu, stage, format);
         for pane in &mut self.panes {
             let size = (pane.config.width, pane.config.height);
             pane.target = pane.target_for(&self.gpu, &self.renderer, stage, size);
         }
+        Ok(())
     }
 
     pub(super) fn resize(&mut self, stage: &Stage, id: WindowId, size: PhysicalSize<u32>) {
