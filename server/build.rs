@@ -34,7 +34,13 @@ fn of_repository() -> Option<String> {
     // An archive unpacked inside another repository is not of that repository's commit.
     git(&["ls-files", "--error-unmatch", "build.rs"])?;
     let commit = git(&["rev-parse", "--short=10", "HEAD"])?;
-    let changed = git(&["status", "--porcelain", "--untracked-files=no"]);
+    // Without its lock git does not write the index, which would make the next build think that it has changed.
+    let changed = git(&[
+        "--no-optional-locks",
+        "status",
+        "--porcelain",
+        "--untracked-files=no",
+    ]);
     let dirty = changed.is_none_or(|changed| !changed.is_empty());
     Some(if dirty {
         format!("{commit}-dirty")
