@@ -59,7 +59,7 @@ fn write_all(mut to: impl Write, lines: impl Iterator<Item = String>, name: &str
     let mut lost = 0_u64;
     for line in lines {
         let end_of_lost = if lost > 0 { "\n" } else { "" };
-        let written = write!(to, "{end_of_lost}{line}\n").and_then(|()| to.flush());
+        let written = writeln!(to, "{end_of_lost}{line}").and_then(|()| to.flush());
         match written {
             Ok(()) if lost > 0 => {
                 tracing::info!("--metrics-json {name} is written again; {lost} lines are lost");
