@@ -1,4 +1,4 @@
-"""Recordings of sessions as a LeRobot dataset, format v3.0: python -m taut.lerobot SESSION... OUT. Needs pyarrow (pip install 'taut[lerobot]').
+"""Recordings of sessions as a LeRobot dataset, format v3.0: python -m taut.lerobot SESSION... OUT. Needs pyarrow (pip install pyarrow).
 
 Each session is an episode. At each frame stands the newest record that there was: nothing is interpolated.
 """
