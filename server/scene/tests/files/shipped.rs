@@ -1,6 +1,35 @@
 //! What is shipped loads, and so do the assembly scenes of the data directory.
 
-use taut_scene::{DeviceTrace, HandPreset, SHIPPED_SCENES, Scene, Workbench, check, data_file};
+use std::path::Path;
+
+use taut_scene::{
+    DeviceTrace, HandPreset, SHIPPED_SCENES, SHIPPED_WORKBENCH, Scene, Workbench, check, data_file,
+};
+
+/// Tables of a workbench file, with a key that none of them knows. Those of `[device]` hang on its kind: docs/devices.md.
+const UNKNOWN: [&str; 21] = [
+    "qqqqqq=1",
+    "scene_origin.qqqqqq=1",
+    "screen.0.qqqqqq=1",
+    "node.0.qqqqqq=1",
+    "node.0.window.qqqqqq=1",
+    "machine.0.qqqqqq=1",
+    "viewer.qqqqqq=1",
+    "viewer.sway.qqqqqq=1",
+    "dynamics.qqqqqq=1",
+    "network.qqqqqq=1",
+    "frames.qqqqqq=1",
+    "monitoring.qqqqqq=1",
+    "vrpn.qqqqqq=1",
+    "observers.qqqqqq=1",
+    "operator.qqqqqq=1",
+    "zenoh.qqqqqq=1",
+    "wrench_in.qqqqqq=1",
+    "log.qqqqqq=1",
+    "realtime.qqqqqq=1",
+    "safety.qqqqqq=1",
+    "show.qqqqqq=1",
+];
 
 #[test]
 fn the_peg_scene_is_the_papers() {
@@ -116,6 +145,49 @@ fn the_shipped_workbench_is_l_shaped() {
     );
     assert_eq!(workbench.nodes.len(), 2);
     assert_eq!(workbench.load_scene().unwrap().name(), "peg-in-a-hole");
+}
+
+/// What stands under each heading of the shipped workbench, behind the sign of a comment too.
+fn tables() -> Vec<(String, String)> {
+    let mut tables = vec![(String::new(), String::new())];
+    for line in SHIPPED_WORKBENCH.lines() {
+        let line = line.trim_start_matches(['#', ' ']);
+        if let Some(heading) = line.strip_prefix('[') {
+            let name = heading.trim_start_matches('[').split(']').next();
+            tables.push((name.unwrap_or_default().to_owned(), String::new()));
+        } else if let Some((_, text)) = tables.last_mut() {
+            text.push_str(line);
+            text.push('\n');
+        }
+    }
+    tables
+}
+
+/// The keys that the parser knows beside an unknown one.
+fn known_beside(unknown: &str) -> Vec<String> {
+    let text = format!("{SHIPPED_WORKBENCH}\n[dynamics]\n[[machine]]\n");
+    let error = Workbench::parse_with_overrides("w.toml", &text, Path::new(""), &[unknown])
+        .expect_err("an unknown key");
+    let mut texts = error.problems().iter().map(|p| p.text.as_str());
+    let listed = texts.find_map(|text| text.split_once("; known keys: "));
+    let (_, keys) = listed.unwrap_or_else(|| panic!("{unknown}: {error}"));
+    keys.split(", ").map(str::to_owned).collect()
+}
+
+#[test]
+fn the_shipped_workbench_has_every_key() {
+    let tables = tables();
+    for unknown in UNKNOWN {
+        let heading = unknown.split_once('.').map_or("", |(heading, _)| heading);
+        for key in known_beside(unknown) {
+            let written = format!("{key} = ");
+            let is_there = tables.iter().any(|(name, text)| {
+                let is_table = heading.is_empty() && *name == key;
+                is_table || name == heading && text.contains(&written)
+            });
+            assert!(is_there, "nobody reads of `{key}` of {unknown}");
+        }
+    }
 }
 
 #[test]
