@@ -114,7 +114,7 @@ pub(super) fn places(root: &Section<'_>, network: &Network, nodes: usize, frames
         );
     }
     if nodes > MAX_MEMBERS && frames.swap != FrameSwap::Off {
-        let at = root.get("nodes").map_or(root.at(), |node| &node.at);
+        let at = root.get("node").map_or(root.at(), |node| &node.at);
         root.complain(
             at,
             format!(

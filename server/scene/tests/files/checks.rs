@@ -265,6 +265,11 @@ fn nodes_without_a_place_are_a_fault_and_clients_that_cost_much_a_note() {
         !report.is_good() && text.contains("at most 32 are kept together"),
         "{text}"
     );
+    let first = SHIPPED_WORKBENCH
+        .lines()
+        .position(|line| line == "[[node]]");
+    let told: Vec<Option<usize>> = report.problems.iter().map(|p| p.line).collect();
+    assert_eq!(told, [first.map(|line| line + 1)], "{text}");
     let off = ("swap = \"scheduled\"", "swap = \"off\"");
     let report = workbench_with(40, &[room, off]);
     assert!(report.is_good(), "{report}");
