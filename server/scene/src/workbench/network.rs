@@ -18,8 +18,8 @@ const MAX_CLIENTS: i64 = 256;
 const SINGLE_PLACES: usize = 3;
 /// Silence after which a node counts as gone, s: ten of its signs of life.
 const NODE_TIMEOUT: f64 = 0.5;
-/// Shortest and longest that may be asked for, s: what clients can be told.
-const MIN_NODE_TIMEOUT: f64 = 0.001;
+/// Shortest and longest that may be asked for, s: two of a node's signs of life, which is the least that clients take for it; and what they can be told.
+const MIN_NODE_TIMEOUT: f64 = 0.1;
 const MAX_NODE_TIMEOUT: f64 = 60.0;
 
 /// Group and interface of multicast; the interface must be known where multicast is asked for.

@@ -79,9 +79,9 @@ fn every_fault_names_file_line_and_key() {
         ),
         (
             "node_timeout = 0.5 ",
-            "node_timeout = 0 ",
+            "node_timeout = 0.05 ",
             "node_timeout",
-            "`node_timeout` in [network] is 0, but must be between 0.001 and 60",
+            "`node_timeout` in [network] is 0.05, but must be between 0.1 and 60",
         ),
         (
             "bind = \"127.0.0.1\"",
