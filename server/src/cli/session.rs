@@ -11,7 +11,7 @@ use super::values::{device_text, first_port, output, positive_seconds, tracking_
 
 /// `taut demo`.
 #[derive(Clone, Debug, Default, Args)]
-#[command(after_help = taut_kinds::device_help() + "\nExample: taut demo --scene two-bunnies --duration 30 --headless --json")]
+#[command(after_help = taut_kinds::device_help() + "\nExample: taut demo --scene moving-plate --duration 30 --headless --json")]
 pub struct DemoArgs {
     /// A shipped scene by its name, or a scene file
     #[arg(long, value_name = "NAME|FILE")]
