@@ -101,7 +101,15 @@ pub fn directory() -> PathBuf {
 }
 
 /// The reference answer of a recipe, from the cache where it is there.
+///
+/// # Panics
+///
+/// Where an obstacle moves: in the run each stays where it begins, so its answer would be that of another scene.
 pub(crate) fn of(recipe: &Recipe) -> Answer {
+    assert!(
+        recipe.moving.is_none(),
+        "{recipe:?}: no obstacle moves in a reference run; give the right answer as a formula"
+    );
     let file = directory().join(format!("{}-{}.bin", recipe.name, content(recipe)));
     let cached = fs::read(&file)
         .ok()
@@ -234,6 +242,18 @@ pub(crate) fn content(recipe: &Recipe) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recipe::Ideal;
+    use crate::recipes::{Extent, all};
+
+    #[test]
+    #[should_panic(expected = "no obstacle moves in a reference run")]
+    fn a_scene_that_moves_has_no_reference_run() {
+        let mut recipes = all(Extent::Quick).into_iter();
+        let moves = recipes.find(|recipe| recipe.moving.is_some());
+        let mut recipe = moves.expect("a recipe with an obstacle that moves");
+        recipe.ideal = Ideal::Reference;
+        let _ = recipe.answer();
+    }
 
     #[test]
     fn a_cached_answer_is_the_same_to_the_bit_and_a_broken_one_is_none() {

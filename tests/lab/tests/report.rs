@@ -116,6 +116,27 @@ fn a_miss_of_our_own_is_named() {
     assert!(after.contains(&format!("open: a reason &lt;of mine&gt;<td>{}", index + 2)));
 }
 
+/// What the page foretells is what its own clock brings, and it says by which clock and error it is made.
+#[test]
+fn failures_that_the_page_predicts_are_seen() {
+    let late = Plan {
+        recipes: Some(vec!["R11".into()]),
+        methods: vec![Method::Paper],
+        ..plan(Vec::new())
+    };
+    let page = taut_lab::page::html(&late.run(&Store::none())).expect("a page");
+    let section = |id: &str| {
+        let from = page.split(&format!("id={id}>")).nth(1).expect(id);
+        from.split("<h2").next().expect("its end")
+    };
+    let predicted = section("predicted");
+    assert_eq!(predicted.matches("class=\"pass key\"").count(), 3);
+    assert!(!predicted.contains("class=\"fail key\""), "{predicted}");
+    for said in ["ripple", taut_lab::costs::machine()] {
+        assert!(section("reading").contains(said), "{said}");
+    }
+}
+
 /// A trace is what the run was: the one of discrete detection loses the plate that ours is held by, at the limit of the force.
 #[test]
 fn a_trace_shows_the_fall_through_the_plate() {

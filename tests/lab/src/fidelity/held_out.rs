@@ -12,7 +12,7 @@ use god_object::Pose;
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use taut_scene::{SceneError, shapes};
 
-use super::scenes::{FidelityScene, share, text};
+use super::scenes::{ABOVE, FidelityScene, STIFFNESS, force, share, text};
 use super::sweep::{Swept, choice};
 
 /// The predictions, as they were committed.
@@ -21,6 +21,9 @@ pub const PREDICTIONS: &str = include_str!("../../data/held-out.csv");
 const COLUMNS: &str = "scene,rate_hz,gap_tolerance_m,rounds,mesh_error_m,predicted_j\n";
 /// Time to come down and press, s: the share of a minimum-jerk motion of the other scenes.
 const PRESS: f64 = 0.2;
+/// Where the plate of `lift.csv` begins and ends, m, and how fast it rises, m/s.
+const LIFT: [f64; 2] = [-2e-3, 4e-3];
+const LIFTING: f64 = 0.02;
 
 /// Seconds since the hand has pressed.
 fn on(time: f64) -> f64 {
@@ -198,17 +201,23 @@ fn edged(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
             0.6,
             |time| at(0.08 * on(time), 0.0, 0.0101 - 2.1e-3 * share(time)),
         ),
-        scene(
-            "plate lifts a ball",
-            text(
-                &ball(0.015),
-                [0.0, 0.0, 0.0151],
-                "shape = { plane = {} }\nmotion = { trace = \"lift.csv\" }",
-                [0.02, 0.0, 4.0],
-            ),
-            0.5,
-            |_| at(0.0, 0.0, 0.0151),
-        ),
+        FidelityScene {
+            ideal: Some(|time| {
+                let height = (LIFT[0] + LIFTING * time).min(LIFT[1]);
+                force(Vector3::z() * (STIFFNESS * (height - ABOVE).max(0.0)))
+            }),
+            ..scene(
+                "plate lifts a ball",
+                text(
+                    &ball(0.015),
+                    [0.0, 0.0, 0.0151],
+                    "shape = { plane = {} }\nmotion = { trace = \"lift.csv\" }",
+                    [0.02, 0.0, 4.0],
+                ),
+                0.5,
+                |_| at(0.0, 0.0, 0.0151),
+            )
+        },
     ]
 }
 
@@ -290,4 +299,23 @@ pub fn verdict(swept: &[Swept]) -> (String, usize) {
         );
     }
     (text, kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use god_object::Vector6;
+
+    use super::*;
+
+    #[test]
+    fn the_plate_that_lifts_is_judged_by_its_formula() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scenes = all(folder.path()).expect("files can be written");
+        let mut moving = scenes.iter().filter(|s| s.text.contains("motion"));
+        let right = moving.next().and_then(|s| s.ideal).expect("a formula");
+        assert!(moving.next().is_none());
+        assert_eq!(right(0.1), Vector6::zeros());
+        assert!((right(0.2)[2] - 1.9).abs() < 1e-9);
+        assert!((right(0.4)[2] - 3.9).abs() < 1e-9);
+    }
 }

@@ -19,7 +19,7 @@ use god_object::{Pose, Vector6};
 use taut_scene::shapes;
 
 /// 1/(k_h k_s m): 2000 / s^2, 0.5, 1 kg.
-const STIFFNESS: f64 = 1000.0;
+pub(super) const STIFFNESS: f64 = 1000.0;
 /// How deep the device goes, m: 2 N.
 const DEPTH: f64 = 2e-3;
 /// Radii of the spheres, m.
@@ -32,7 +32,7 @@ const FAST: f64 = 1.0;
 const PLATE: f64 = 5e-3;
 /// Where the fast hand stops, and how high the hand waits for the plate, m.
 const ARRIVED: f64 = SMALL_BALL - 0.012;
-const ABOVE: f64 = 1e-4;
+pub(super) const ABOVE: f64 = 1e-4;
 /// Turns of the rod, rad/s, and half its length, m.
 const TURN: f64 = 2.0;
 const ROD: f64 = 0.04;
@@ -54,7 +54,7 @@ pub struct FidelityScene {
     pub device: Motion,
     /// s.
     pub duration: f64,
-    /// The right wrench at a time, s; `None` takes a reference run.
+    /// The right wrench at a time, s; `None` takes a reference run, in which no obstacle moves.
     pub ideal: Option<fn(f64) -> Vector6>,
 }
 
@@ -111,7 +111,7 @@ fn pressed(time: f64) -> (f64, f64) {
     (depth, (time - PRESS).max(0.0))
 }
 
-fn force(vector: Vector3<f64>) -> Vector6 {
+pub(super) fn force(vector: Vector3<f64>) -> Vector6 {
     Vector6::new(vector.x, vector.y, vector.z, 0.0, 0.0, 0.0)
 }
 

@@ -1,8 +1,9 @@
 //! A god-object with discrete collision detection: the poses between the start and the end of a step are not looked at.
 //!
-//! Constraints, projection and force are those of the god-object method; contacts have gaps. Only the motion differs: the body goes
-//! where the projection leads if it is free there, else as far as bisection finds it free. A step that is longer
-//! than body and obstacle are thick can lead through.
+//! Projection and force are those of the god-object method; contacts have gaps. The motion differs: the body goes
+//! where the projection leads if it is free there, else as far as bisection finds it free, once an update. A step that is longer
+//! than body and obstacle are thick can lead through. Contacts are those within the activation distance: there is no look-ahead, so a faster device
+//! meets them late.
 
 use std::sync::Arc;
 
