@@ -16,15 +16,9 @@
  * No device was at hand, and not the vendor's library.
  */
 #define _POSIX_C_SOURCE 200809L
-#include <math.h>
 #include <pthread.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
-#include "taut_device.h"
 #include "vendor.h"
 
 enum {
@@ -32,9 +26,12 @@ enum {
     HD_CURRENT_VELOCITY = 0x2051,
     HD_CURRENT_TRANSFORM = 0x2052,
     HD_DEVICE_MODEL_TYPE = 0x2501,
+    HD_CALIBRATION_STYLE = 0x2555,
     HD_CURRENT_FORCE = 0x2700,
     HD_FORCE_OUTPUT = 0x4000,
+    HD_CALIBRATION_NEEDS_UPDATE = 0x5001,
     HD_CALIBRATION_NEEDS_MANUAL_INPUT = 0x5002,
+    HD_CALIBRATION_AUTO = 2, HD_CALIBRATION_INKWELL = 4, /* a bit each */
     HD_CALLBACK_DONE = 0,
     HD_CALLBACK_CONTINUE = 1,
     HD_DEFAULT_PRIORITY = 32767,
@@ -51,7 +48,7 @@ typedef struct {
     unsigned device;
 } hd_error;
 
-/* The functions of the vendor's library. The last two may be missing. */
+/* The functions of the vendor's library. The last three may be missing. */
 static struct {
     void *library;
     unsigned (*InitDevice)(const char *);
@@ -70,6 +67,7 @@ static struct {
     void (*Unschedule)(unsigned long);
     const char *(*GetString)(unsigned);
     unsigned (*CheckCalibration)(void);
+    void (*UpdateCalibration)(unsigned);
 } hd;
 
 struct device {
@@ -87,13 +85,6 @@ struct device {
     double wanted[3], written; /* N in the vendor's axes; when, s */
     bool let_go;               /* the servo thread has rendered none since the last write */
 };
-
-static double now(void)
-{
-    struct timespec time;
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
 
 /* A pointer to a function from dlsym's pointer to data, as POSIX has it. */
 #define FIND(name, missing) (*(void **)&hd.name = symbol(hd.library, "hd" #name, missing))
@@ -122,6 +113,7 @@ static int load(const char *path)
     FIND(Unschedule, &missing);
     FIND(GetString, NULL);
     FIND(CheckCalibration, NULL);
+    FIND(UpdateCalibration, NULL);
     return complete(&hd.library, missing);
 }
 
@@ -130,6 +122,20 @@ static unsigned failed(void)
 {
     unsigned code = hd.GetError().code;
     return code >= HD_FIRST_FORCE_ERROR && code < HD_FORCE_ERROR ? 0 : code;
+}
+
+/* Whether the device asks for its inkwell. What it has found out since is taken over: until then its poses are those of before. */
+static bool asks_for_inkwell(void)
+{
+    unsigned state = hd.CheckCalibration ? hd.CheckCalibration() : 0;
+    int styles = 0;
+    if (state == HD_CALIBRATION_NEEDS_UPDATE && hd.UpdateCalibration) {
+        hd.GetIntegerv(HD_CALIBRATION_STYLE, &styles);
+        styles &= HD_CALIBRATION_AUTO | HD_CALIBRATION_INKWELL;
+        if (styles)
+            hd.UpdateCalibration(styles & HD_CALIBRATION_AUTO ? HD_CALIBRATION_AUTO : HD_CALIBRATION_INKWELL);
+    }
+    return state == HD_CALIBRATION_NEEDS_MANUAL_INPUT;
 }
 
 /* A millisecond of the vendor's servo thread. */
@@ -141,8 +147,8 @@ static unsigned servo(void *shared)
     bool uncalibrated, closing;
     unsigned error;
 
+    uncalibrated = asks_for_inkwell();
     hd.BeginFrame(device->handle);
-    uncalibrated = hd.CheckCalibration && hd.CheckCalibration() == HD_CALIBRATION_NEEDS_MANUAL_INPUT;
     for (int i = 0; i < 16; i++)
         transform[i] = NAN; /* what is not set is no pose */
     hd.GetDoublev(HD_CURRENT_TRANSFORM, transform);

@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <time.h>
 
 #include "taut_device.h"
 
@@ -34,6 +35,14 @@ static bool number(const char *value, double low, double high, double *target)
         return false;
     *target = read;
     return true;
+}
+
+/* s, of a clock that nobody sets. */
+static inline double now(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
 /* A function of the vendor's library; the first that is missing is named. */

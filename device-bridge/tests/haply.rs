@@ -240,7 +240,7 @@ struct Ends {
 impl Wire {
     fn new(with_grip: bool) -> Self {
         let mut service = simulated(with_grip);
-        let mut exchange = Exchange::new(ExchangeSettings::default(), ArmState::default());
+        let mut exchange = Exchange::new(ExchangeSettings::default());
         exchange
             .hear(&service.inventory(Duration::ZERO, 1))
             .expect("an inventory");

@@ -2,12 +2,12 @@
 #![cfg(unix)]
 
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::support::faulty::Faulty;
 use crate::support::floor::{Dice, OnFloor, ms};
-use crate::support::stage::{Faults, HANGS, NOT_A_NUMBER, VICE, no_write_jumps};
-use nalgebra::{Isometry3, Point3, Vector6};
+use crate::support::stage::{Faults, HANGS, Inside, NOT_A_NUMBER, VICE, no_write_jumps, opened};
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::{BoardInfo, Counters, Cycle, SimulatedBoards};
 use taut_bridge::{
@@ -120,6 +120,22 @@ fn no_cycle_of_the_boards_jumps() {
         patience: ms(1000),
     };
     no_write_jumps(&choice, &line, &faults);
+}
+
+#[test]
+fn boards_that_are_gone_keep_nobody_from_an_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let link = folder.path().join("boards");
+    let line = Faulty::of(boards(false, [0; STRINGS]), |_| 0, |_| Vector3::zeros());
+    let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
+    let device = opened(&format!("spidar:{}", link.display())).expect("it is there");
+    line.set("mode", HANGS);
+    // More than are asked before they are given up: they are looked for, for seconds.
+    line.wait("they are looked for", &|| line.get("served") > 60);
+    let begun = Instant::now();
+    drop(device);
+    let took = begun.elapsed();
+    assert!(took < ms(2000), "it was left to itself: {took:?}");
 }
 
 #[test]

@@ -112,7 +112,12 @@ fn damaged_reports(reports: u64) -> (u64, u64) {
         let wave = |rate: f64| (rate * time as f64 * 1e-3).sin();
         let place = Vector3::new(0.03 * wave(3.0), 0.03 * wave(2.1), 0.03 * wave(4.3));
         let encoders = MODEL.encoders(&place).expect("within reach");
-        let whole = BoardReport { encoders, info: 1 }.bytes().to_vec();
+        let report = BoardReport {
+            encoders,
+            info: 1,
+            button: false,
+        };
+        let whole = report.bytes().to_vec();
         let mut report = whole.clone();
         let is_damaged = dice.roll(10) == 0;
         if is_damaged {

@@ -101,7 +101,7 @@ pub enum BridgeError {
     },
     /// The server came back with a scene in which the device stands elsewhere.
     #[error(
-        "the server {server} came back with another scene ({scene}), and this device finds its place when it is opened: the force is zero; start the bridge again, strings with the grip at the centre"
+        "the server {server} came back with another scene ({scene}), and this device finds its place when it is opened: the force is zero; start the bridge again, strings with the grip at the centre, an arm on a HID board at its home"
     )]
     OtherScene {
         /// As given.

@@ -140,8 +140,8 @@ impl Run<'_> {
         }
     }
 
-    /// The device opened anew in another scene: where it stands there is known when it is opened. Strings are calibrated then, with the
-    /// grip at the centre, so a person has to hold it there.
+    /// The device opened anew in another scene: where it stands there is known when it is opened. Some are calibrated then, strings with the
+    /// grip at the centre and arms on HID boards at their home, so a person has to hold them there.
     fn placed(
         &mut self,
         bridge: BridgeLoop,

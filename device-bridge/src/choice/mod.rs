@@ -45,7 +45,12 @@ impl DeviceChoice {
     /// It takes itself to be at a known place when it is opened: not while somebody works with it.
     #[must_use]
     pub fn is_calibrated_when_opened(&self) -> bool {
-        matches!(self, Self::Input(InputChoice::Spidar(_)))
+        match self {
+            Self::Input(InputChoice::Spidar(_)) => true,
+            #[cfg(unix)]
+            Self::Input(InputChoice::Wooden(_)) => true,
+            _ => false,
+        }
     }
 }
 
@@ -256,6 +261,10 @@ mod tests {
         let error = "spidar:/dev/x,geometry=nothing".parse::<DeviceChoice>();
         let error = error.expect_err("no geometry").to_string();
         assert!(error.contains("g6x4r"), "{error}");
+        // The counters of both are set when they are opened.
+        let calibrated = |text| choice(text).is_calibrated_when_opened();
+        assert!(calibrated("spidar:/dev/x") && calibrated("wooden"));
+        assert!(!calibrated("haply") && !calibrated("polhem:/dev/x"));
     }
 
     #[test]

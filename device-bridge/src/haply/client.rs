@@ -112,7 +112,7 @@ pub(crate) fn start(
     }
     let talker = Talker {
         address,
-        settings,
+        exchange: Exchange::new(settings),
         opened: Some(first),
     };
     WireThread::start("taut-haply", priority, talker).map_err(HaplyError::Thread)
@@ -123,7 +123,7 @@ type Socket = WebSocket<TcpStream>;
 /// The thread's own.
 struct Talker {
     address: ServiceAddress,
-    settings: ExchangeSettings,
+    exchange: Exchange,
     /// For the first session.
     opened: Option<Socket>,
 }
@@ -140,22 +140,18 @@ impl Wire for Talker {
     fn session(&mut self, line: &mut ArmLine) -> Result<(), Lost> {
         let opened = self.opened.take();
         let mut socket = opened.map_or_else(|| connect(&self.address), Ok)?;
-        let mut exchange = Exchange::new(self.settings.clone(), line.state);
-        let ended = self.speak(&mut socket, &mut exchange, line);
-        line.state = *exchange.state();
-        said_last(&mut socket, &mut exchange);
+        self.exchange.begin();
+        let ended = self.speak(&mut socket, line);
+        line.state = *self.exchange.state();
+        said_last(&mut socket, &mut self.exchange);
         ended
     }
 }
 
 impl Talker {
     /// A message a millisecond, until the end or until the connection is lost.
-    fn speak(
-        &self,
-        socket: &mut Socket,
-        exchange: &mut Exchange,
-        line: &mut ArmLine,
-    ) -> Result<(), Lost> {
+    fn speak(&mut self, socket: &mut Socket, line: &mut ArmLine) -> Result<(), Lost> {
+        let exchange = &mut self.exchange;
         let greeting = next_text(socket)?.ok_or(Lost::NoInventory)?;
         exchange.hear(&greeting).map_err(Lost::Nonsense)?;
         socket.get_ref().set_read_timeout(Some(ANSWER_WITHIN))?;
@@ -248,7 +244,7 @@ pub fn look(address: &ServiceAddress) -> Result<HaplyFound, HaplyError> {
     let measured = || {
         let greeting = next_text(&mut socket)?.ok_or(Lost::NoInventory)?;
         let said = Said::parse(&greeting).map_err(Lost::Nonsense)?;
-        let mut exchange = Exchange::new(ExchangeSettings::default(), ArmState::default());
+        let mut exchange = Exchange::new(ExchangeSettings::default());
         exchange.hear(&greeting).map_err(Lost::Nonsense)?;
         let mut answers = Vec::with_capacity(LOOKS);
         for _ in 0..LOOKS {

@@ -1,4 +1,4 @@
-//! One connection to a service, without sockets: which arm and which grip are used, what they said last, and what is said next.
+//! Connections to a service, one after the other, without sockets: which arm and which grip are used, what they said last, and what is said next.
 
 use std::time::Duration;
 
@@ -58,13 +58,13 @@ pub enum Unusable {
     NoGrip,
 }
 
-/// The client's half of one connection.
+/// The client's half. What it has once chosen it keeps: another arm is in another hand.
 #[derive(Debug)]
 pub struct Exchange {
     settings: ExchangeSettings,
     arm: Option<String>,
     grip: Option<(GripKind, String)>,
-    /// Messages said with an arm known.
+    /// Messages said in this connection with an arm known.
     said: u32,
     other_basis: bool,
     state: ArmState,
@@ -76,19 +76,26 @@ pub struct Exchange {
 const CONFIGURED: u32 = 2;
 
 impl Exchange {
-    /// Nothing said or heard yet; `state` counts on from the connection before.
+    /// Nothing said or heard yet.
     #[must_use]
-    pub fn new(settings: ExchangeSettings, state: ArmState) -> Self {
+    pub fn new(settings: ExchangeSettings) -> Self {
         Self {
             settings,
             arm: None,
             grip: None,
             said: 0,
             other_basis: false,
-            state,
-            unusable: None,
+            state: ArmState::default(),
+            unusable: Some(Unusable::NoService),
             text: String::with_capacity(512),
         }
+    }
+
+    /// Another connection, of which nothing is said or heard yet.
+    pub fn begin(&mut self) {
+        (self.said, self.other_basis) = (0, false);
+        self.state.is_usable = false;
+        self.unusable = Some(Unusable::NoService);
     }
 
     /// What the device said last.
@@ -218,5 +225,46 @@ impl Exchange {
             self.said = self.said.saturating_add(1);
         }
         &self.text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a service says that has these arms and grips, in this order.
+    fn inventory(arms: &[&str], grips: &[&str]) -> String {
+        let list = |names: &[&str], state: &str| {
+            let device = |name: &&str| format!(r#"{{"device_id":"{name}","state":{state}}}"#);
+            names.iter().map(device).collect::<Vec<_>>().join(",")
+        };
+        let arms = list(arms, r#"{"cursor_position":{"x":0.1,"y":0.0,"z":0.0}}"#);
+        let grips = list(
+            grips,
+            r#"{"orientation":{"w":1.0,"x":0.0,"y":0.0,"z":0.0}}"#,
+        );
+        format!(r#"{{"inverse3":[{arms}],"wireless_verse_grip":[{grips}]}}"#)
+    }
+
+    #[test]
+    fn every_connection_is_for_the_arm_and_the_grip_of_the_first() {
+        let mut exchange = Exchange::new(ExchangeSettings::default());
+        let heard = |exchange: &mut Exchange, arms: &[&str], grips: &[&str]| {
+            let heard = exchange.hear(&inventory(arms, grips));
+            heard.expect("an inventory");
+            exchange.unusable()
+        };
+        assert_eq!(heard(&mut exchange, &["A", "B"], &["1", "2"]), None);
+
+        exchange.begin();
+        assert_eq!(exchange.unusable(), Some(Unusable::NoService));
+        let other_arm = heard(&mut exchange, &["B"], &["1"]);
+        assert_eq!(other_arm, Some(Unusable::NotPlugged));
+        let other_grip = heard(&mut exchange, &["B", "A"], &["2"]);
+        assert_eq!(other_grip, Some(Unusable::NoGrip));
+        assert_eq!(heard(&mut exchange, &["B", "A"], &["2", "1"]), None);
+        let said = exchange.say(Some([1.0, 0.0, 0.0]));
+        let pushed = r#""device_id":"A","commands":{"set_cursor_force""#;
+        assert!(said.contains(pushed), "{said}");
     }
 }

@@ -154,11 +154,7 @@ impl Serial {
             Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
             Err(error) => return Err(error),
         }
-        let mut newest = None;
-        while let Some(end) = self.buffer.iter().position(|byte| *byte == b'\n') {
-            newest = Frame::parse(&self.buffer[..=end]).ok().or(newest);
-            self.buffer.drain(..=end);
-        }
+        let newest = Frame::newest(&mut self.buffer);
         if self.buffer.len() > MAX_BUFFER {
             self.buffer.clear();
         }

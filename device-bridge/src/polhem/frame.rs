@@ -1,18 +1,22 @@
-//! Lines of 63 bytes, blank-padded, the last byte a line's end.
+//! Lines of 64 bytes, blank-padded, the last byte a line's end. The board ends its numbers with another one before it pads them.
 //!
 //! ```text
 //!   from the board   x y z [mm]  tA lambda tD tE [rad]  info
-//!   to the board     fx fy fz [mN]  0 0 0 0
+//!   to the board     fx fy fz [mN]  2 0 0 0
 //! ```
 //!
-//! The orientation is Rz(tA) Ry(-lambda) Rx(tD) Ry(tE). There is no checksum: a line counts only if it has 63 bytes and eight numbers in range.
+//! The orientation is Rz(tA) Ry(-lambda) Rx(tD) Ry(tE). There is no checksum: a line counts only if it has 64 bytes and eight numbers in range.
+//!
+//! Source: `haptikfabrikenapi` at b8d6c94, its micro API 0.2 (`uhaptikfabriken.h`).
 
 use std::fmt::Write;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Of a line, its end included.
-pub(crate) const LINE: usize = 63;
+pub(crate) const LINE: usize = 64;
+/// The command that goes with a force: 0 goes with currents, 1 sets counters.
+const FORCE: i32 = 2;
 /// Farthest cursor that is believed, mm along an axis: the workspace has a radius of 150.
 const FARTHEST_MM: f64 = 500.0;
 /// Largest angle, rad.
@@ -34,7 +38,7 @@ pub struct Frame {
 /// Why a line is not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BrokenFrame {
-    /// Not 63 bytes with the line's end last.
+    /// Not 64 bytes with the line's end last.
     #[error("a line of the Polhem board has not {LINE} bytes")]
     Length,
     /// Not eight numbers.
@@ -54,6 +58,8 @@ impl Frame {
         let [text @ .., b'\n'] = line else {
             return Err(BrokenFrame::Length);
         };
+        // Behind the numbers is another line's end; before them may be what is left of the line before.
+        let text = text.trim_ascii();
         if line.len() != LINE || text.contains(&b'\n') {
             return Err(BrokenFrame::Length);
         }
@@ -89,13 +95,33 @@ impl Frame {
         })
     }
 
+    /// The newest line at the front of `buffer`, from which it and all before it are taken; what is no line is dropped.
+    pub(crate) fn newest(buffer: &mut Vec<u8>) -> Option<Self> {
+        let mut newest = None;
+        while let Some(line) = buffer.get(..LINE) {
+            let taken = match Self::parse(line) {
+                Ok(frame) => {
+                    newest = Some(frame);
+                    LINE
+                }
+                // On from behind the next line's end.
+                Err(_) => match buffer.iter().position(|byte| *byte == b'\n') {
+                    Some(end) => end + 1,
+                    None => break,
+                },
+            };
+            buffer.drain(..taken);
+        }
+        newest
+    }
+
     /// The line of it; `None` where it is too long.
     #[must_use]
     pub fn line(&self) -> Option<[u8; LINE]> {
         let [x, y, z] = self.position.map(|metres| metres * 1e3);
         let [a, b, c, d] = self.angles;
         padded(&format!(
-            "{x:.3} {y:.3} {z:.3} {a:.4} {b:.4} {c:.4} {d:.4} {}",
+            "{x:.3} {y:.3} {z:.3} {a:.4} {b:.4} {c:.4} {d:.4} {}\n",
             self.info
         ))
     }
@@ -121,7 +147,7 @@ pub fn force_frame(force: &[f64; 3]) -> [u8; LINE] {
         if is_finite { limited as i32 } else { 0 }
     });
     let mut text = String::with_capacity(LINE);
-    let _ = write!(text, "{x} {y} {z} 0 0 0 0");
+    let _ = write!(text, "{x} {y} {z} {FORCE} 0 0 0");
     padded(&text).unwrap_or([b' '; LINE]) // six digits each: it fits
 }
 
@@ -135,7 +161,7 @@ pub fn read_force(line: &[u8]) -> Option<[f64; 3]> {
         .filter(|word| !word.is_empty())
         .map(|word| word.parse().ok())
         .collect::<Option<_>>()?;
-    let &[x, y, z, _, _, _, _] = &words[..] else {
+    let &[x, y, z, FORCE, _, _, _] = &words[..] else {
         return None;
     };
     Some([x, y, z].map(|millinewtons| f64::from(millinewtons) * 1e-3))
@@ -155,7 +181,7 @@ mod tests {
     use super::*;
 
     fn line(text: &str) -> Vec<u8> {
-        format!("{text:<62}\n").into_bytes()
+        format!("{text:<63}\n").into_bytes()
     }
 
     #[test]
@@ -166,7 +192,9 @@ mod tests {
         assert_eq!((frame.angles, frame.info), ([0.1, -0.2, 0.3, -0.4], 1));
         assert_eq!(
             frame.line().map(|line| line.to_vec()),
-            Some(line("12.500 -3.250 0.125 0.1000 -0.2000 0.3000 -0.4000 1"))
+            Some(line(
+                "12.500 -3.250 0.125 0.1000 -0.2000 0.3000 -0.4000 1\n"
+            ))
         );
         let turned = Frame {
             angles: [0.5, 0.0, 0.0, 0.0],
@@ -182,11 +210,11 @@ mod tests {
         assert!((turned.scaled_axis() + Vector3::y() * 0.5).norm() < 1e-12);
         assert_eq!(
             force_frame(&[1.0, -0.5, 0.0004])[..],
-            line("1000 -500 0 0 0 0 0")[..]
+            line("1000 -500 0 2 0 0 0")[..]
         );
         assert_eq!(
             force_frame(&[f64::NAN, 1.0, 1.0])[..],
-            line("0 0 0 0 0 0 0")[..]
+            line("0 0 0 2 0 0 0")[..]
         );
         assert_eq!(
             read_force(&force_frame(&[1.0, -0.5, 0.25])),
@@ -214,6 +242,39 @@ mod tests {
         ] {
             assert_eq!(Frame::parse(&line(text)), Err(why), "{text}");
         }
-        assert_eq!(read_force(&line("1 2 3 0 0 0")), None);
+        assert_eq!(read_force(&line("1 2 3 2 0 0")), None);
+        assert_eq!(read_force(&line("1 2 3 0 0 0 0")), None, "currents");
+    }
+
+    #[test]
+    fn lines_are_found_again_after_a_byte_too_few_or_too_many() {
+        let frame = |info: i32| Frame {
+            position: [0.0125, -0.00325, 0.5],
+            angles: [0.1, -0.2, 0.3, -0.4],
+            info,
+        };
+        let line = |info: i32| frame(info).line().expect("short enough").to_vec();
+        for at in 0..LINE {
+            for is_lost in [false, true] {
+                let mut broken = line(1);
+                if is_lost {
+                    broken.remove(at);
+                } else {
+                    broken.insert(at, b'7');
+                }
+                let mut buffer = Vec::new();
+                let mut found = Vec::new();
+                for bytes in [line(0), broken, line(2), line(3), line(4), line(5)] {
+                    buffer.extend(bytes);
+                    found.extend(Frame::newest(&mut buffer));
+                }
+                let is_good = |read: &Frame| {
+                    let sent = Frame::parse(&line(read.info));
+                    sent.is_ok_and(|sent| sent == *read)
+                };
+                assert!(found.iter().all(is_good), "at {at}: {found:?}");
+                assert_eq!(found.last().map(|read| read.info), Some(5), "at {at}");
+            }
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! whenever no answer was believed for 20 ms, and first of all after the boards were found.
 
 use std::io::{Read, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -13,6 +14,7 @@ use taut_spidar::{Geometry, PerString, Reading, STRINGS, StringFault, StringHard
 use super::converter::{digit, digits_per_newton};
 use super::counters::Counters;
 use super::cycle::{BrokenCycle, Cycle};
+use super::error::BoardsError;
 use super::packet::{BoardInfo, INFO, INFO_ANSWER, INFO_PADDING, MAX_BOARDS, header};
 use crate::devices::wire_thread::{HOLDS, Line, Wire, WireState, WireThread};
 use crate::realtime::{Ticker, monotonic_now};
@@ -42,61 +44,6 @@ const COUNTS_WITHIN: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_millis(1);
 /// Cycles of zero currents at an end, in case one is lost.
 const LAST_CYCLES: u32 = 3;
-
-/// Why there are no boards.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum BoardsError {
-    /// The port cannot be opened.
-    #[error(
-        "the serial port {path} cannot be opened ({cause}); look at the cable and at `taut doctor`, and let your user open it: sudo usermod -aG dialout $USER, then log in again"
-    )]
-    Port {
-        /// As given.
-        path: String,
-        /// What the system says.
-        cause: String,
-    },
-    /// Nobody answers, or not eight motors.
-    #[error(
-        "on {path} there are motor boards with {motors} motors together, but a SPIDAR-G needs 8; look at the boards' supply and at their cables"
-    )]
-    Motors {
-        /// As given.
-        path: String,
-        /// That were found.
-        motors: usize,
-    },
-    /// They are there, and say nothing that is to be believed.
-    #[error(
-        "the motor boards on {path} answer, but not in time or not twice alike, so that nobody knows where the grip is; look at their cables, and whether this machine is busy"
-    )]
-    Counts {
-        /// As given.
-        path: String,
-    },
-    /// Nothing is known of the amplifiers.
-    #[error(
-        "the geometry {0} has no `volts_per_newton`, without which no current is known; write it into its file"
-    )]
-    NoVolts(String),
-    /// The converters have no range for these motors.
-    #[error(
-        "the least tension of the geometry {name} is {least} N, but the converters of motor boards reach {most:.2} N with its `volts_per_newton`; correct its file"
-    )]
-    OutOfRange {
-        /// The geometry's.
-        name: String,
-        /// As given, N.
-        least: f64,
-        /// N.
-        most: f64,
-    },
-    /// No thread.
-    #[error(
-        "cannot start a thread for the motor boards: {0}; end other programs or raise the limit"
-    )]
-    Thread(String),
-}
 
 /// What the thread hands on.
 #[derive(Clone, Copy, Debug, Default)]
@@ -138,7 +85,7 @@ impl SpidarBoards {
             bytes: Vec::with_capacity(256),
             heard: Vec::with_capacity(512),
         };
-        serial.found = Some(serial.find()?);
+        serial.found = Some(serial.find(&AtomicBool::new(false))?);
         let thread = WireThread::start("taut-spidar", priority, serial);
         let mut thread = thread.map_err(|error| BoardsError::Thread(error.to_string()))?;
         let until = monotonic_now() + COUNTS_WITHIN;
@@ -210,7 +157,11 @@ impl Wire for Serial {
     }
 
     fn session(&mut self, line: &mut BoardLine) -> Result<(), String> {
-        let found = self.found.take().map_or_else(|| self.find(), Ok);
+        let found = self.found.take();
+        let found = found.map_or_else(|| self.find(&line.end()), Ok);
+        if found.is_err() && line.is_over() {
+            return Ok(()); // they were not looked for to the end
+        }
         let (mut port, cycle) = found.map_err(|error| error.to_string())?;
         let ended = self.turn(&mut port, &cycle, line);
         self.let_go(&mut port, &cycle);
@@ -219,8 +170,8 @@ impl Wire for Serial {
 }
 
 impl Serial {
-    /// Opens the port and looks for the boards.
-    fn find(&mut self) -> Result<(Port, Cycle), BoardsError> {
+    /// Opens the port and looks for the boards, until `end`.
+    fn find(&mut self, end: &AtomicBool) -> Result<(Port, Cycle), BoardsError> {
         let path = self.path.clone();
         let failed = |error: &dyn std::fmt::Display| BoardsError::Port {
             path: path.clone(),
@@ -234,7 +185,8 @@ impl Serial {
         let mut found = (None, 0, Vec::new());
         for patience in FOUND_WITHIN {
             port.set_timeout(patience).map_err(|error| failed(&error))?;
-            let boards = self.ask_all(&mut port).map_err(|error| failed(&error))?;
+            let boards = self.ask_all(&mut port, end);
+            let boards = boards.map_err(|error| failed(&error))?;
             let motors = boards
                 .iter()
                 .map(|(_, info)| usize::from(info.motors))
@@ -259,10 +211,14 @@ impl Serial {
         Ok((port, cycle))
     }
 
-    /// Asks each number on the line what it is.
-    fn ask_all(&mut self, port: &mut Port) -> std::io::Result<Vec<(u8, BoardInfo)>> {
+    /// Asks each number on the line what it is, until `end`.
+    fn ask_all(
+        &mut self,
+        port: &mut Port,
+        end: &AtomicBool,
+    ) -> std::io::Result<Vec<(u8, BoardInfo)>> {
         let mut boards = Vec::new();
-        for board in 0..MAX_BOARDS {
+        for board in (0..MAX_BOARDS).take_while(|_| !end.load(Ordering::Relaxed)) {
             self.bytes.clear();
             self.bytes.resize(INFO_PADDING.0, 0);
             self.bytes.push(header(board, INFO));

@@ -2,7 +2,7 @@
 
 use taut_spidar::{Geometry, PerString, STRINGS};
 
-use super::boards::BoardsError;
+use super::error::BoardsError;
 
 /// Digits per volt of the boards' converter, and its largest.
 const DIGITS: (f64, f64) = (4096.0 / 3.3, 4095.0);

@@ -16,12 +16,14 @@ mod boards;
 mod converter;
 mod counters;
 mod cycle;
+mod error;
 mod packet;
 mod simulated;
 
-pub use boards::{BoardsError, SpidarBoards};
+pub use boards::SpidarBoards;
 pub(crate) use converter::within_range;
 pub use counters::Counters;
 pub use cycle::{BrokenCycle, Cycle};
+pub use error::BoardsError;
 pub use packet::BoardInfo;
 pub use simulated::SimulatedBoards;

@@ -10,8 +10,8 @@ use nalgebra::Isometry3;
 use taut_plant::{Hand, MinJerkPath, Tremor};
 use taut_spidar::{Geometry, STRINGS, StringHardware, StringLosses};
 
-use super::boards::BoardsError;
 use super::converter::digits_per_newton;
+use super::error::BoardsError;
 use super::packet::{BoardInfo, COMMANDS, CURRENT, INFO, SET_LENGTHS, header};
 use crate::devices::{HeldStrings, SpidarPlacement};
 use crate::pseudo_terminal::FarEnd;

@@ -154,7 +154,7 @@ impl Talker {
                 .orientation(&self.encoders)
                 .map(|q| [q.w, q.i, q.j, q.k]),
             turning: None,
-            buttons: 0,
+            buttons: u16::from(report.button),
         };
         line.publish();
         true

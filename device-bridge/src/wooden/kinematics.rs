@@ -41,7 +41,7 @@ pub struct WoodenModel {
     pub max_stiffness: f64,
     /// Counters with the arm at its home.
     pub home: [i16; 6],
-    /// Signs of motors a, b, c and of wrist d, e, f.
+    /// Signs of motors a, b, c, and of the wrist's joints from the arm on.
     pub signs: [f64; 6],
 }
 
@@ -137,7 +137,8 @@ impl WoodenModel {
             return None;
         }
         let [a, _, c] = self.angles(encoders);
-        let wrist = |i: usize| self.signs[i] * TAU * f64::from(encoders[i]) / self.wrist_counts;
+        // In reverse: the last encoder is at the wrist's first joint.
+        let wrist = |i: usize| self.signs[i] * TAU * f64::from(encoders[8 - i]) / self.wrist_counts;
         let about = UnitQuaternion::from_axis_angle;
         let (x, y, z) = (Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis());
         Some(
@@ -221,6 +222,20 @@ impl WoodenModel {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_last_encoder_is_at_the_first_joint_of_the_wrist() {
+        let model = WoodenModel::named("polhem-1").expect("published");
+        let turned = |[d, e, f]: [i16; 3]| {
+            let [a, b, c, ..] = model.home;
+            model.orientation(&[a, b, c, d, e, f]).expect("a wrist")
+        };
+        let quarter = |axis: Vector3<f64>| UnitQuaternion::from_scaled_axis(axis * FRAC_PI_2);
+        let (x, y) = (quarter(-Vector3::x()), quarter(Vector3::y()));
+        let straight = turned([0; 3]);
+        assert!(turned([0, 256, 256]).angle_to(&(straight * x * y)) < 1e-9);
+        assert!(turned([256, 256, 0]).angle_to(&(straight * y * x)) < 1e-9);
+    }
 
     #[test]
     fn every_model_goes_there_and_back_and_pushes_as_it_is_told() {

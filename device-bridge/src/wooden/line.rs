@@ -5,6 +5,9 @@ use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+#[cfg(feature = "hid")]
+use super::report::{HOST, TEENSY};
+
 /// A device that reads and writes whole reports.
 pub trait ReportLine: Send {
     /// Waits at most `timeout` for one report; 0 bytes where none came.
@@ -22,7 +25,9 @@ pub trait ReportLine: Send {
 
 /// USB ids of the boards: a Teensy, an mbed.
 #[cfg(feature = "hid")]
-pub(crate) const IDS: [(u16, u16); 2] = [(0x16c0, 0x0486), (0x1234, 0x0006)];
+pub(crate) const IDS: [(u16, u16); 2] = [(TEENSY_VENDOR, 0x0486), (0x1234, 0x0006)];
+#[cfg(feature = "hid")]
+const TEENSY_VENDOR: u16 = 0x16c0;
 
 /// Opens the device at `path`, a hidraw or a socket; without one the first board on USB.
 pub(crate) fn open(path: Option<&Path>) -> Result<Box<dyn ReportLine>, String> {
@@ -49,7 +54,13 @@ fn open_hid(path: Option<&Path>) -> Result<Box<dyn ReportLine>, String> {
     });
     let found = found
         .ok_or_else(|| "no such board is plugged in (USB 16c0:0486 or 1234:0006)".to_owned())?;
-    Ok(Box::new(HidLine(found.open_device(&hid).map_err(said)?)))
+    Ok(Box::new(HidLine {
+        device: found.open_device(&hid).map_err(said)?,
+        length: match found.vendor_id() {
+            TEENSY_VENDOR => 1 + TEENSY,
+            _ => HOST,
+        },
+    }))
 }
 
 #[cfg(not(feature = "hid"))]
@@ -59,20 +70,26 @@ fn open_hid(_path: Option<&Path>) -> Result<Box<dyn ReportLine>, String> {
 
 /// A board at `/dev/hidraw*`.
 #[cfg(feature = "hid")]
-struct HidLine(hidapi::HidDevice);
+struct HidLine {
+    device: hidapi::HidDevice,
+    /// Of a report to it, with its number.
+    length: usize,
+}
 
 #[cfg(feature = "hid")]
 impl ReportLine for HidLine {
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, String> {
         let milliseconds = i32::try_from(timeout.as_millis()).unwrap_or(i32::MAX);
-        self.0
+        self.device
             .read_timeout(buffer, milliseconds)
             .map_err(|error| error.to_string())
     }
 
     fn write(&mut self, report: &[u8]) -> Result<(), String> {
-        self.0
-            .write(report)
+        let mut whole = [0; 1 + TEENSY];
+        whole[..report.len()].copy_from_slice(report);
+        self.device
+            .write(&whole[..self.length])
             .map(drop)
             .map_err(|error| error.to_string())
     }

@@ -2,7 +2,7 @@
 //!
 //! | file            | what                                                                    |
 //! |-----------------|-------------------------------------------------------------------------|
-//! | `report.rs`     | the reports: 14 bytes in, 15 out                                          |
+//! | `report.rs`     | the reports: 14 bytes in, 15 out; 64 and 65 of a Teensy                   |
 //! | `kinematics.rs` | from encoders to a pose, from a force to currents; the published models  |
 //! | `line.rs`       | hidraw, or a socket in its place                                         |
 //! | `board.rs`      | the thread: under its thread                                              |

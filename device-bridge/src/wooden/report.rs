@@ -1,30 +1,43 @@
-//! HID reports: seven integers of 16 bits, little-endian, each way.
+//! HID reports: seven integers of 16 bits, little-endian, each way. A Teensy's are longer, and say nothing behind them.
 
-/// Length of a report of the board.
+/// Length of what a board says.
 pub(crate) const BOARD: usize = 14;
+/// Length of a Teensy's reports, either way, without a number.
+pub(crate) const TEENSY: usize = 64;
 /// Length of a report of the host, its number 0 included.
 pub(crate) const HOST: usize = 15;
 /// Sets the encoders' counters.
 const SET_COUNTERS: i16 = 1;
+/// What a pressed button adds to counter d.
+const PRESSED: i16 = 10_000;
 
 /// What the board says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BoardReport {
     /// Counters a to f: three motors, three of the wrist.
     pub encoders: [i16; 6],
-    /// Flags; one says whether the counters were set.
+    /// 1 from the board's own button for calibration on, until the counters are set.
     pub info: i16,
+    /// Whether the button at the handle is pressed.
+    pub button: bool,
 }
 
 impl BoardReport {
-    /// Reads one; `None` where it has not 14 bytes.
+    /// Reads one; `None` where it has neither 14 bytes nor a Teensy's 64.
     #[must_use]
     pub fn parse(bytes: &[u8]) -> Option<Self> {
-        let bytes: &[u8; BOARD] = bytes.try_into().ok()?;
+        let is_whole = [BOARD, TEENSY].contains(&bytes.len());
+        let bytes: &[u8; BOARD] = bytes.first_chunk().filter(|_| is_whole)?;
         let word = |i: usize| i16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]);
+        let mut encoders: [i16; 6] = std::array::from_fn(word);
+        let button = encoders[3] > PRESSED / 2;
+        if button {
+            encoders[3] -= PRESSED;
+        }
         Some(Self {
-            encoders: std::array::from_fn(word),
+            encoders,
             info: word(6),
+            button,
         })
     }
 
@@ -32,7 +45,8 @@ impl BoardReport {
     #[must_use]
     pub fn bytes(&self) -> [u8; BOARD] {
         let [a, b, c, d, e, f] = self.encoders;
-        let words = [a, b, c, d, e, f, self.info];
+        let pressed = if self.button { PRESSED } else { 0 };
+        let words = [a, b, c, d.wrapping_add(pressed), e, f, self.info];
         std::array::from_fn(|i| words[i / 2].to_le_bytes()[i % 2])
     }
 }
@@ -85,6 +99,7 @@ mod tests {
         let report = BoardReport {
             encoders: [1, -2, 300, 4, 5, -6],
             info: 1,
+            button: false,
         };
         assert_eq!(
             report.bytes(),
@@ -102,6 +117,23 @@ mod tests {
         for report in [push, set] {
             assert_eq!(HostReport::parse(&report.bytes()), Some(report));
             assert_eq!(HostReport::parse(&report.bytes()[1..]), None);
+        }
+    }
+
+    #[test]
+    fn a_teensy_s_longer_report_and_a_pressed_button_are_read() {
+        let pressed = BoardReport {
+            encoders: [1, -2, 300, -40, 5, -6],
+            info: 0,
+            button: true,
+        };
+        let mut bytes = pressed.bytes().to_vec();
+        assert_eq!(bytes[6..8], 9_960_i16.to_le_bytes());
+        assert_eq!(BoardReport::parse(&bytes), Some(pressed));
+        bytes.resize(TEENSY, 0xa5);
+        assert_eq!(BoardReport::parse(&bytes), Some(pressed));
+        for length in [0, 13, 15, 63] {
+            assert_eq!(BoardReport::parse(&bytes[..length]), None, "{length}");
         }
     }
 }

@@ -117,7 +117,7 @@ impl SimulatedWooden {
         let counters = std::array::from_fn(|i| encoders[i].wrapping_add(self.offsets[i]));
         BoardReport {
             encoders: counters,
-            info: 1,
+            ..BoardReport::default()
         }
         .bytes()
     }

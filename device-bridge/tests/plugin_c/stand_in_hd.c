@@ -15,6 +15,7 @@ typedef struct {
 static int enabled;
 static _Atomic int runs;
 static _Atomic unsigned error;
+static _Atomic int calibrated; /* what the inkwell said is taken over */
 static unsigned (*callback)(void *);
 static void *user;
 static pthread_t thread;
@@ -50,7 +51,15 @@ void hdEndFrame(unsigned device)
 }
 void hdEnable(unsigned what) { enabled |= what == 0x4000; }
 const char *hdGetString(unsigned what) { return what == 0x2501 ? "stand-in Touch" : 0; }
-unsigned hdCheckCalibration(void) { return taut_test_mode == NOT_CALIBRATED ? 0x5002 : 0x5000; }
+unsigned hdCheckCalibration(void)
+{
+    if (taut_test_mode == NOT_CALIBRATED) {
+        calibrated = 0;
+        return 0x5002;
+    }
+    return calibrated ? 0x5000 : 0x5001;
+}
+void hdUpdateCalibration(unsigned style) { calibrated = style == 4; }
 /* Turned by 2.5 rad about the axis to the right; 30 mm right, 20 mm towards the user. */
 void hdGetDoublev(unsigned what, double *to)
 {
@@ -60,12 +69,15 @@ void hdGetDoublev(unsigned what, double *to)
         step();
         if (taut_test_mode == NOT_A_NUMBER)
             transform[13] = NAN;
+        if (!calibrated)
+            transform[12] += 70;
         memcpy(to, transform, sizeof transform);
     }
     if (what == 0x2051)
         memcpy(to, velocity, sizeof velocity);
 }
-void hdGetIntegerv(unsigned what, int *to) { *to = what == 0x2000 ? 2 : -1; }
+/* Buttons; ways of calibration: encoders set by hand, and an inkwell. */
+void hdGetIntegerv(unsigned what, int *to) { *to = what == 0x2000 ? 2 : what == 0x2555 ? 1 | 4 : -1; }
 void hdSetDoublev(unsigned what, const double *from)
 {
     if (what == 0x2700)

@@ -47,7 +47,8 @@ pub(crate) fn arm_board(bytes: &[u8]) {
         assert!(force.iter().all(|part| part.is_finite()));
     }
     if let Some(report) = BoardReport::parse(bytes) {
-        assert_eq!(report.bytes(), bytes);
+        // A Teensy's says nothing behind that.
+        assert_eq!(report.bytes(), bytes[..14]);
     }
     if let Some(report) = HostReport::parse(bytes) {
         assert_eq!(HostReport::parse(&report.bytes()), Some(report));
@@ -94,6 +95,7 @@ pub(crate) fn arm_board_seeds() -> Vec<Vec<u8>> {
     let report = BoardReport {
         encoders: [1, -2, 300, 4, 5, -6],
         info: 1,
+        button: true,
     };
     vec![
         frame.line().unwrap_or_else(|| panic!("a line")).to_vec(),
