@@ -42,6 +42,8 @@ pub(super) struct Topics<'a, W: Write> {
     /// Name of its frame, and its topic.
     obstacles: Vec<(String, Topic)>,
     buttons: Option<u16>,
+    /// When the device was where it was told to be last.
+    newest_sample: Option<Duration>,
     bytes: Vec<u8>,
 }
 
@@ -74,6 +76,7 @@ impl<'a, W: Write> Topics<'a, W> {
             writer,
             scene,
             buttons: None,
+            newest_sample: None,
             bytes: Vec::new(),
         })
     }
@@ -95,6 +98,19 @@ impl<'a, W: Write> Topics<'a, W> {
         if record.faulty {
             return Ok(()); // the pose is that of the tick before
         }
+        if self.buttons.replace(record.buttons) != Some(record.buttons) {
+            let joy = Joy::new(sampled.in_frame(DEVICE), record.buttons);
+            put(
+                &mut self.writer,
+                &mut self.device_buttons,
+                &mut self.bytes,
+                record.tick,
+                &joy,
+            )?;
+        }
+        if self.newest_sample.replace(record.time) == Some(record.time) {
+            return Ok(()); // the last sample, read again: readers of transforms complain of a time that comes twice
+        }
         let world = sampled.in_frame(WORLD);
         let pose = PoseStamped::new(world, &record.pose);
         put(
@@ -112,16 +128,6 @@ impl<'a, W: Write> Topics<'a, W> {
             record.tick,
             &twist,
         )?;
-        if self.buttons.replace(record.buttons) != Some(record.buttons) {
-            let joy = Joy::new(sampled.in_frame(DEVICE), record.buttons);
-            put(
-                &mut self.writer,
-                &mut self.device_buttons,
-                &mut self.bytes,
-                record.tick,
-                &joy,
-            )?;
-        }
         let mut transforms = vec![TransformStamped::new(world, DEVICE, &record.pose)];
         if let Some(scene) = self.scene {
             let point = reference_frame(&record.pose, &scene.reference_point);
