@@ -221,6 +221,11 @@ fn the_file_says_what_it_is() {
         assert!(schema.name.contains("/msg/"), "{}", schema.name);
         assert!(!schema.data.is_empty());
     }
+    // As the profile of ROS 2 in MCAP's registry has it: required, a list in YAML.
+    for channel in summary.channels.values() {
+        let qos = channel.metadata.get("offered_qos_profiles");
+        assert_eq!(qos.map(String::as_str), Some("[]"), "{}", channel.topic);
+    }
     let about = mcap::read::metadata(&file.bytes, &summary.metadata_indexes[0]);
     assert!(about.is_ok_and(|about| about.name == "taut" && about.metadata["scene"] == "none"));
 }

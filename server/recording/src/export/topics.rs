@@ -1,5 +1,6 @@
 //! The topics of an export, and how a record becomes messages on them.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::time::Duration;
 
@@ -222,7 +223,9 @@ impl<'a, W: Write> Topics<'a, W> {
 
 fn topic<M: Message, W: Write>(writer: &mut Writer<NoSeek<W>>, name: &str) -> McapResult<Topic> {
     let schema = writer.add_schema(M::NAME, "ros2msg", M::schema().as_bytes())?;
-    let channel = writer.add_channel(schema, name, "cdr", &Default::default())?;
+    // MCAP's profile of ROS 2 requires the list; nobody offered these messages on a network, so it is empty.
+    let qos = ("offered_qos_profiles".to_owned(), "[]".to_owned());
+    let channel = writer.add_channel(schema, name, "cdr", &BTreeMap::from([qos]))?;
     Ok(Topic {
         channel,
         messages: 0,
