@@ -250,6 +250,8 @@ impl ExternalWrench {
             self.spoiled = news.spoiled;
             self.newest = None;
             self.statistics.refuse(Refused::Spoiled);
+            // A good one may have come right behind it, within this tick: the force ends all the same, and the next one ramps in.
+            return;
         }
         // What came before the spoiled one is not felt again.
         let Some(sent) = news.sent.filter(|sent| sent.received > self.spoiled) else {

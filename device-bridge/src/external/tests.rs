@@ -155,6 +155,29 @@ fn what_is_no_wrench_stops_the_force_until_a_later_value_comes() {
 }
 
 #[test]
+fn what_is_no_wrench_ends_the_force_with_a_good_one_right_behind_it() {
+    let mut bench = Bench::new(ExternalWrenchSettings {
+        ramp_in: ms(500),
+        ..settings()
+    });
+    let mut felt = 0.0;
+    for now in 1..=600 {
+        bench.push(now, X);
+        felt = bench.at(now).x;
+    }
+    assert_eq!(felt, X);
+    // Both come between two ticks.
+    bench.newest.spoiled = ms(600) + Duration::from_micros(300);
+    bench.push(601, X);
+    assert_eq!(bench.at(601), Vector6::zeros());
+    assert_eq!(bench.external.judged(), None, "nor is it passed on");
+    assert_eq!(bench.refused(Refused::Spoiled), 1);
+    bench.push(602, X);
+    let again = bench.at(602).x;
+    assert!(again > 0.0 && again <= 1.0 / 500.0 + 1e-12, "{again}");
+}
+
+#[test]
 fn however_large_it_is_it_keeps_its_direction_and_its_limit() {
     let mut bench = Bench::new(settings());
     for (tick, size) in (1..).zip([1e3, 1e30, 1e300, f64::MAX]) {

@@ -51,7 +51,9 @@ thread_local! {
 /// The sentence of the last call of this thread that failed; empty before the first. Valid until the next call of this thread fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn taut_last_error() -> *const c_char {
-    LAST.with(|last| last.try_borrow().map_or(c"".as_ptr(), |text| text.as_ptr()))
+    // Where the thread ends, other variables of the thread may still call: there is no sentence any more.
+    LAST.try_with(|last| last.try_borrow().map_or(c"".as_ptr(), |text| text.as_ptr()))
+        .unwrap_or(c"".as_ptr())
 }
 
 /// Runs `body`; an error or a panic becomes a code, and its sentence is kept.
@@ -72,7 +74,8 @@ pub(crate) fn guard(body: impl FnOnce() -> Result<(), Refusal>) -> TautStatus {
         }
     };
     let text = CString::new(refusal.text.replace('\0', " ")).unwrap_or_default();
-    LAST.with(|last| {
+    // As in `taut_last_error`: the code alone is left.
+    let _ = LAST.try_with(|last| {
         if let Ok(mut last) = last.try_borrow_mut() {
             *last = text;
         }
@@ -163,5 +166,32 @@ mod tests {
             text.to_str(),
             Ok("a fault of the library (index 7 of 3); please report it")
         );
+    }
+
+    /// Such as by the end of a `thread_local` variable of C++.
+    #[test]
+    fn a_call_while_its_thread_ends_is_answered_with_its_code() {
+        struct AtEnd(std::sync::mpsc::Sender<(TautStatus, bool)>);
+        impl Drop for AtEnd {
+            fn drop(&mut self) {
+                let status = guard(|| Err(Refusal::argument("late")));
+                // SAFETY: a string that ends with a zero byte.
+                let text = unsafe { CStr::from_ptr(taut_last_error()) };
+                let _ = self.0.send((status, text.is_empty()));
+            }
+        }
+        thread_local! {
+            static AT_END: RefCell<Option<AtEnd>> = const { RefCell::new(None) };
+        }
+        let (told, hears) = std::sync::mpsc::channel();
+        let thread = std::thread::Builder::new().name("ends".to_owned());
+        let thread = thread.spawn(move || {
+            // The first that is used is the last that ends.
+            AT_END.with(|end| *end.borrow_mut() = Some(AtEnd(told)));
+            guard(|| Err(Refusal::argument("early")))
+        });
+        let ended = thread.expect("a thread").join();
+        assert_eq!(ended.ok(), Some(TautStatus::TAUT_BAD_ARGUMENT));
+        assert_eq!(hears.recv(), Ok((TautStatus::TAUT_BAD_ARGUMENT, true)));
     }
 }

@@ -48,15 +48,19 @@ pub(crate) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
         SocketAddr::V6(_) => TcpSocket::new_v6()?,
     };
     socket.set_reuseaddr(true)?;
-    socket.set_send_buffer_size(SEND_BUFFER_BYTES)?; // those who are accepted have it from here
+    // Those who are accepted have both from here.
+    socket.set_send_buffer_size(SEND_BUFFER_BYTES)?;
+    socket.set_keepalive(true)?;
     socket.bind(address)?;
     socket.listen(BACKLOG)
 }
 
-/// A socket that dials with the same buffers as those that are accepted.
+/// A socket that dials with the same buffers as those that are accepted, and the same question whether the client is still there: one that takes its
+/// poses by datagram is sent nothing over TCP for hours, and would keep its place for ever when its machine is gone.
 pub(crate) fn dialling_socket() -> io::Result<TcpSocket> {
     let socket = TcpSocket::new_v4()?;
     socket.set_send_buffer_size(SEND_BUFFER_BYTES)?;
+    socket.set_keepalive(true)?;
     Ok(socket)
 }
 
@@ -93,6 +97,29 @@ impl Drop for Service {
         if let Some(thread) = self.thread.take() {
             // A panic of the service is no fault of the loops; it has been printed.
             let _ = thread.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn silent_clients_are_asked_by_the_system_whether_they_are_there() {
+        let runtime = runtime().expect("a runtime");
+        let (dialled, accepted) = runtime.block_on(async {
+            let listener = listen(SocketAddr::from(([127, 0, 0, 1], 0))).expect("a free port");
+            let address = listener.local_addr().expect("bound");
+            let socket = dialling_socket().expect("a socket");
+            let dialled = socket.connect(address).await.expect("it listens");
+            let (accepted, _) = listener.accept().await.expect("a client");
+            (dialled, accepted)
+        });
+        for stream in [dialled, accepted] {
+            let stream = stream.into_std().expect("a socket");
+            let socket = TcpSocket::from_std_stream(stream);
+            assert_eq!(socket.keepalive().ok(), Some(true));
         }
     }
 }

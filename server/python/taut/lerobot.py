@@ -71,6 +71,8 @@ def export(
         stats = {f"stats/{key}/{what}": value for key, each in _stats(columns).items() for what, value in each.items()}
         episodes.append({"episode_index": number, "tasks": [did], "length": count} | place | span | stats)
         begin += count
+    if not episodes:
+        raise TautError(f"{out}: there is no session to export; name the directories of recordings")
     _write(out, tables, tasks, episodes, int(fps))
     said.append(f"{out}: {len(episodes)} episodes, {begin} frames at {fps} a second")
     return said

@@ -150,6 +150,7 @@ class LeRobot(unittest.TestCase):
             (self.sessions, self.sessions[0], 50, "is not empty"),
             (self.sessions, new, 0, "from 1 to 1000"),
             ([broken], new, 50, "updates.csv: cannot be read"),
+            (self.place.glob("none-*"), new, 50, "there is no session"),
         ]:
             with self.subTest(text), self.assertRaisesRegex(taut.TautError, text):
                 taut.lerobot.export(sessions, out, fps)

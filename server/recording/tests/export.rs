@@ -12,7 +12,7 @@ use taut_recording::{
     export_mcap,
 };
 
-use crate::reading::{Joy, PoseStamped, SixStamped, TfMessage, Transform, export};
+use crate::reading::{Header, Joy, PoseStamped, SixStamped, TfMessage, Transform, export};
 use crate::round_trip::{manifest, pose, update};
 
 fn tick(sequence: u32, buttons: u16, faulty: bool) -> HapticsRecord {
@@ -128,6 +128,45 @@ fn every_record_is_there_bit_by_bit_at_its_session_time() {
 }
 
 #[test]
+fn a_sample_that_is_read_again_is_told_once_its_force_at_each_tick() {
+    let directory = tempfile::tempdir().expect("no temporary directory");
+    let (mut taps, recorder) =
+        Recorder::start(directory.path(), manifest(), "").expect("cannot record");
+    // Behind a network: two ticks for each sample of the device.
+    for number in 1..=6_u32 {
+        taps.haptics.push(HapticsRecord {
+            sequence: u64::from(number),
+            tick: Duration::from_nanos(1_000_250 * u64::from(number)),
+            ..tick(number.div_ceil(2), u16::from(number >= 4), false)
+        });
+    }
+    assert!(recorder.finish().failure.is_none());
+    let scene = scene();
+    let file = export(directory.path(), Ok(&scene));
+    assert_eq!((file.report.ticks, file.left_out()), (6, String::new()));
+    assert_eq!(file.topics["/hand/wrench"].len(), 6);
+    let stamps = |headers: Vec<Header>| -> Vec<u32> {
+        let stamps = headers.iter().map(|header| header.nanosec / 1_000_000);
+        stamps.collect()
+    };
+    let poses = file.read::<PoseStamped>("/device/pose");
+    let headers = poses.into_iter().map(|(_, PoseStamped(header, _))| header);
+    assert_eq!(stamps(headers.collect()), [1, 2, 3]);
+    let twists = file.read::<SixStamped>("/device/twist");
+    let headers = twists.into_iter().map(|(_, SixStamped(header, _))| header);
+    assert_eq!(stamps(headers.collect()), [1, 2, 3]);
+    let messages = file.read::<TfMessage>("/tf").into_iter();
+    let transforms = messages.flat_map(|(_, TfMessage(transforms))| transforms);
+    let devices = transforms.filter(|Transform(_, child, _)| child == "device");
+    let headers = devices.map(|Transform(header, _, _)| header);
+    assert_eq!(stamps(headers.collect()), [1, 2, 3]);
+    // A button that goes down in between is told when it does.
+    let presses = file.read::<Joy>("/device/buttons");
+    let times: Vec<u64> = presses.iter().map(|(time, _)| *time).collect();
+    assert_eq!(times, [1_000_250, 4_001_000]);
+}
+
+#[test]
 fn buttons_are_told_when_they_change() {
     let (directory, scene) = (recorded(), scene());
     let presses = export(directory.path(), Ok(&scene)).read::<Joy>("/device/buttons");
@@ -181,6 +220,11 @@ fn the_file_says_what_it_is() {
         assert_eq!(schema.encoding, "ros2msg");
         assert!(schema.name.contains("/msg/"), "{}", schema.name);
         assert!(!schema.data.is_empty());
+    }
+    // As the profile of ROS 2 in MCAP's registry has it: required, a list in YAML.
+    for channel in summary.channels.values() {
+        let qos = channel.metadata.get("offered_qos_profiles");
+        assert_eq!(qos.map(String::as_str), Some("[]"), "{}", channel.topic);
     }
     let about = mcap::read::metadata(&file.bytes, &summary.metadata_indexes[0]);
     assert!(about.is_ok_and(|about| about.name == "taut" && about.metadata["scene"] == "none"));

@@ -28,7 +28,7 @@ const WORLD: &str = "world";
 const DEVICE: &str = "device";
 const GOD_OBJECT: &str = "god_object";
 const REFERENCE_POINT: &str = "reference_point";
-/// Name of the node.
+/// Name of the node that publishes.
 const NODE: &str = "taut";
 
 /// How the workbench speaks to ROS 2.
@@ -61,13 +61,13 @@ impl SessionTime {
     }
 }
 
-/// The node's name and place for a session's tokens.
-pub(crate) fn node(session: &Session, domain: Domain, namespace: String) -> Node {
+/// A node of the workbench for a session's tokens. Each session has a name of its own: ROS 2 warns of two nodes that share one.
+pub(crate) fn node(session: &Session, domain: Domain, workbench: &str, name: &str) -> Node {
     Node {
         domain,
         session: session.zid().to_string(),
-        namespace,
-        name: NODE.to_owned(),
+        namespace: format!("/{workbench}"),
+        name: name.to_owned(),
     }
 }
 
@@ -142,7 +142,7 @@ impl<'s> RosTopics<'s> {
         scene: &SceneDescription,
         settings: RosSettings,
     ) -> zenoh::Result<Self> {
-        let node = node(session, settings.domain, format!("/{name}"));
+        let node = node(session, settings.domain, name, NODE);
         let own = |topic: &str| format!("/{name}/{topic}");
         let n = &node;
         let names = scene.obstacles.iter().enumerate();

@@ -19,6 +19,8 @@ use zenoh::{Config, Wait};
 use crate::publisher::{ZenohError, client_config, open};
 use crate::ros::node;
 
+/// Name of the node that subscribes.
+const NODE: &str = "taut_wrench_in";
 /// Largest number that is taken for one of a wrench, N or N m, as in taut's own datagrams.
 const MAX_NUMBER: f64 = 1e6;
 /// Time between two looks whether it is to end.
@@ -88,7 +90,7 @@ impl RosWrenchSubscriber {
                 let Some(session) = open(&config, &stopping) else {
                     return;
                 };
-                let node = node(&session, settings.domain, format!("/{}", settings.name));
+                let node = node(&session, settings.domain, &settings.name, NODE);
                 let token = node.subscription::<WrenchStamped<'_>>(1, &settings.topic);
                 let subscribed = (|| {
                     let subscriber = session

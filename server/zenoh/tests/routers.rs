@@ -12,7 +12,10 @@ use taut_proto::codec::decode;
 use taut_proto::scene::BodyDescription;
 use taut_proto::state::{EventRecord, RunState, ToolState, event_code};
 use taut_proto::{HotState, MeshHash, PoseF64, SceneDescription};
-use taut_zenoh::{ZenohPublisher, ZenohSettings};
+use taut_zenoh::{
+    Domain, RosSettings, RosWrenchSettings, RosWrenchSubscriber, SessionTime, ZenohPublisher,
+    ZenohSettings,
+};
 use zenoh::{Config, Session, Wait};
 
 /// Far above what a loaded machine needs.
@@ -216,4 +219,58 @@ fn a_wrong_configuration_is_said_at_once_and_an_end_without_a_router_does_not_wa
     let (_, feed) = state_channel();
     let waiting = ZenohPublisher::start(settings("tcp/127.0.0.1:1", None), &hello(), feed);
     drop(waiting.expect("a good configuration"));
+}
+
+#[test]
+fn no_two_nodes_of_ros_have_the_same_name() {
+    let (_router, endpoint) = router("");
+    let connect = vec![endpoint.trim_matches('"').to_owned()];
+    let stop = Arc::<AtomicBool>::default();
+    let settings = ZenohSettings {
+        name: "bench".to_owned(),
+        connect: connect.clone(),
+        config: None,
+        rate: 100.0,
+        naming: |_| None,
+        ros: Some(RosSettings {
+            domain: Domain(7),
+            session_time: SessionTime::reading(Duration::ZERO),
+        }),
+    };
+    let _publisher =
+        ZenohPublisher::start(settings, &hello(), workbench(&stop)).expect("a good configuration");
+    let wrench = RosWrenchSettings {
+        name: "bench".to_owned(),
+        connect,
+        config: None,
+        domain: Domain(7),
+        topic: "/ft_sensor/wrench".to_owned(),
+        allow_unproven: false,
+    };
+    let _subscriber = RosWrenchSubscriber::start(wrench, |_| {}).expect("a router here");
+
+    let observer = zenoh::open(config("client", "", &endpoint))
+        .wait()
+        .expect("a router");
+    let end = Instant::now() + PATIENCE;
+    let nodes: BTreeSet<String> = loop {
+        let replies = observer.liveliness().get("@ros2_lv/7/*/0/0/NN/**");
+        let tokens: Vec<String> = replies
+            .wait()
+            .expect("a query")
+            .iter()
+            .filter_map(|reply| Some(reply.result().ok()?.key_expr().to_string()))
+            .collect();
+        assert!(Instant::now() < end, "not both are there: {tokens:?}");
+        if tokens.len() == 2 {
+            let names = tokens.iter().map(|token| {
+                let (_, name) = token.split_once("/NN/").expect("a node's token");
+                name.to_owned()
+            });
+            break names.collect();
+        }
+    };
+    let expected = ["%/%bench/taut", "%/%bench/taut_wrench_in"];
+    assert_eq!(nodes, BTreeSet::from(expected.map(str::to_owned)));
+    stop.store(true, Ordering::Relaxed);
 }

@@ -1,5 +1,6 @@
 //! The topics of an export, and how a record becomes messages on them.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::time::Duration;
 
@@ -42,6 +43,8 @@ pub(super) struct Topics<'a, W: Write> {
     /// Name of its frame, and its topic.
     obstacles: Vec<(String, Topic)>,
     buttons: Option<u16>,
+    /// When the device was where it was told to be last.
+    newest_sample: Option<Duration>,
     bytes: Vec<u8>,
 }
 
@@ -74,6 +77,7 @@ impl<'a, W: Write> Topics<'a, W> {
             writer,
             scene,
             buttons: None,
+            newest_sample: None,
             bytes: Vec::new(),
         })
     }
@@ -95,6 +99,19 @@ impl<'a, W: Write> Topics<'a, W> {
         if record.faulty {
             return Ok(()); // the pose is that of the tick before
         }
+        if self.buttons.replace(record.buttons) != Some(record.buttons) {
+            let joy = Joy::new(sampled.in_frame(DEVICE), record.buttons);
+            put(
+                &mut self.writer,
+                &mut self.device_buttons,
+                &mut self.bytes,
+                record.tick,
+                &joy,
+            )?;
+        }
+        if self.newest_sample.replace(record.time) == Some(record.time) {
+            return Ok(()); // the last sample, read again: readers of transforms complain of a time that comes twice
+        }
         let world = sampled.in_frame(WORLD);
         let pose = PoseStamped::new(world, &record.pose);
         put(
@@ -112,16 +129,6 @@ impl<'a, W: Write> Topics<'a, W> {
             record.tick,
             &twist,
         )?;
-        if self.buttons.replace(record.buttons) != Some(record.buttons) {
-            let joy = Joy::new(sampled.in_frame(DEVICE), record.buttons);
-            put(
-                &mut self.writer,
-                &mut self.device_buttons,
-                &mut self.bytes,
-                record.tick,
-                &joy,
-            )?;
-        }
         let mut transforms = vec![TransformStamped::new(world, DEVICE, &record.pose)];
         if let Some(scene) = self.scene {
             let point = reference_frame(&record.pose, &scene.reference_point);
@@ -216,7 +223,9 @@ impl<'a, W: Write> Topics<'a, W> {
 
 fn topic<M: Message, W: Write>(writer: &mut Writer<NoSeek<W>>, name: &str) -> McapResult<Topic> {
     let schema = writer.add_schema(M::NAME, "ros2msg", M::schema().as_bytes())?;
-    let channel = writer.add_channel(schema, name, "cdr", &Default::default())?;
+    // MCAP's profile of ROS 2 requires the list; nobody offered these messages on a network, so it is empty.
+    let qos = ("offered_qos_profiles".to_owned(), "[]".to_owned());
+    let channel = writer.add_channel(schema, name, "cdr", &BTreeMap::from([qos]))?;
     Ok(Topic {
         channel,
         messages: 0,
