@@ -17,7 +17,7 @@ const LOOK_PERIOD: Duration = Duration::from_millis(100);
 /// Looks in one period of the manager's watchdog, at least.
 const LOOKS_PER_WATCHDOG: u32 = 4;
 /// Longest that a service may take to begin another time: its unit's `TimeoutStartSec`, which holds for the first time.
-const BEGINNING: Duration = Duration::from_secs(120);
+pub(crate) const BEGINNING: Duration = Duration::from_secs(120);
 
 /// Whether there is a manager to tell.
 #[must_use]

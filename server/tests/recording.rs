@@ -214,6 +214,36 @@ fn a_lost_force_is_a_gap_and_what_is_behind_it_is_not_compared() {
     }
 }
 
+/// What its manifest is written to first has a longer path than the system takes, its scene has not: begun, and no more.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_that_cannot_be_begun_leaves_nothing() {
+    let place = tempfile::tempdir().expect("no temporary directory");
+    let mut path = place.path().to_path_buf();
+    while path.as_os_str().len() < 4080 {
+        let missing = 4079 - path.as_os_str().len();
+        path.push("a".repeat(missing.min(100)));
+    }
+    for was_there in [false, true] {
+        if was_there {
+            assert!(std::fs::create_dir(&path).is_ok());
+        }
+        let workbench = shipped_workbench(&[]);
+        let key = ClusterKey::generate().expect("no random numbers");
+        let overrides = Overrides {
+            scene: Some("sphere-on-plane".to_owned()),
+            no_monitor: true,
+            recording: Some(path.clone()),
+            ..Overrides::default()
+        };
+        let started = session_setup(&workbench, key, &overrides).and_then(Session::start);
+        let why = started.err().map(|why| why.to_string());
+        assert!(why.is_some_and(|why| why.contains("recording.json.partial")));
+        let left = std::fs::read_dir(&path).map(Iterator::count).ok();
+        assert_eq!(left, was_there.then_some(0));
+    }
+}
+
 #[test]
 fn an_export_needs_a_recording_and_leaves_nothing_without_one() {
     let directory = tempfile::tempdir().expect("no temporary directory");

@@ -110,6 +110,8 @@ fn run_loop(
         deadline,
         alive,
     };
+    let (alive, handle) = (over.alive.clone(), runtime.handle().clone());
+    let mut build = move |scene: &SceneDescription| alive.while_opening(&handle, || build(scene));
     let mut rejoiner = Rejoiner::new(options, policy(args));
     let Some(first) = runtime.block_on(over.or(rejoiner.join())) else {
         return Err(BridgeError::NeverJoined {

@@ -197,7 +197,7 @@ pub struct TrackArgs {
     /// Name of this node, unique in the workbench
     #[arg(long, value_name = "NAME", default_value = "tracker")]
     pub node: String,
-    /// Readings per second
+    /// Readings per second, 1 to 1000
     #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = tracking_rate)]
     pub rate: f64,
     /// How readings travel
@@ -229,7 +229,7 @@ pub struct PushWrenchArgs {
     /// Name of this node, unique in the workbench
     #[arg(long, value_name = "NAME", default_value = "force")]
     pub node: String,
-    /// Values per second, at most
+    /// Values per second, at most: 1 to 1000
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = tracking_rate)]
     pub rate: f64,
     /// How values travel

@@ -18,8 +18,8 @@ pub(super) const MAX_SECONDS: f64 = 86_400.0;
 pub(super) const MAX_LENGTH: f64 = 1.0;
 /// No loop turns faster.
 pub(super) const MAX_RATE_HZ: f64 = 1e6;
-/// No tracker is faster, and the server would take it for a flood.
-pub(super) const MAX_TRACKING_RATE_HZ: f64 = 1000.0;
+/// No tracker is faster, and the server would take it for a flood. Once in each period a sender looks whether it is to end, and shows that it lives.
+pub(super) const TRACKING_RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
 /// The text of a device, as it is, if it names one.
 pub(super) fn device_text(text: &str) -> Result<String, taut_kinds::UnknownDevice> {
@@ -101,12 +101,29 @@ pub(super) fn picture_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 pub(super) fn tracking_rate(text: &str) -> Result<f64, String> {
-    positive(text, MAX_TRACKING_RATE_HZ, "Hz")
+    let rate = text.parse::<f64>().ok();
+    let usable = rate.filter(|hz| TRACKING_RATES_HZ.contains(hz));
+    usable.ok_or_else(|| "give a rate, from 1 to 1000 Hz".to_owned())
 }
 
 pub(super) fn positive(text: &str, limit: f64, unit: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value <= limit => Ok(value),
         _ => Err(format!("give a number of {unit} above 0 and up to {limit}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_sender_is_so_slow_that_its_period_is_no_time() {
+        for rate in ["1e-300", "5e-20", "0.99", "1001", "NaN", "-1", "fast"] {
+            assert!(tracking_rate(rate).is_err(), "{rate}");
+        }
+        for rate in ["1", "120", "1e3"] {
+            assert_eq!(tracking_rate(rate).ok(), rate.parse::<f64>().ok());
+        }
     }
 }

@@ -36,7 +36,7 @@ impl FileWatch {
         }
     }
 
-    /// These, too: that one of them is gone is a change as any.
+    /// These, too: that one of them goes or comes is a change as any.
     #[must_use]
     pub(crate) fn and_while_there(mut self, paths: Vec<PathBuf>) -> Self {
         let versions = versions(&paths);
@@ -118,5 +118,8 @@ mod tests {
         std::fs::write(&path, "ab").expect("written");
         assert!(!watch.has_changed());
         assert!(watch.has_changed(), "the scene is followed all the same");
+        std::fs::write(&library, "a").expect("written");
+        assert!(!watch.has_changed());
+        assert!(watch.has_changed(), "it is back");
     }
 }

@@ -8,7 +8,6 @@ use taut_bridge::realtime::{keep_cores_awake, lock_memory};
 use taut_bridge::{ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{ServerLink, ServerOptions, proto};
-use taut_recording::{Recorder, Taps};
 use tokio::runtime::Runtime;
 
 use crate::loops::checker::PenetrationChecker;
@@ -26,9 +25,7 @@ use crate::session::monitor::{
 use crate::session::observers::ObserverServices;
 use crate::session::operator::{Continuity, Facts, OperatorPage};
 use crate::session::setup::content::own_colours;
-use crate::session::setup::{
-    DeviceSource, LinkSettings, RecordingSettings, SessionSetup, unencodable,
-};
+use crate::session::setup::{DeviceSource, LinkSettings, SessionSetup, unencodable};
 use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
 use crate::shared::passed_wrench::{self, PassedReader};
@@ -91,7 +88,7 @@ impl Session {
 
         let mut fresh = FreshRecording::default(); // dropped after what writes it
         let recording = setup.recording.as_ref();
-        let recording = recording.map(|wanted| record(wanted, &mut fresh));
+        let recording = recording.map(|wanted| fresh.begin(wanted));
         let (taps, recorder) = recording.transpose()?.unzip();
         let fidelity = setup.fidelity.map(|plan| Fidelity {
             watch: Arc::new(FidelityWatch::new(&plan)),
@@ -287,18 +284,6 @@ fn server_options(
         idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
         ..options
     }
-}
-
-fn record(
-    wanted: &RecordingSettings,
-    fresh: &mut FreshRecording,
-) -> Result<(Taps, Recorder), Failure> {
-    let directory = &wanted.directory;
-    let is_new = !directory.exists();
-    let begun = Recorder::start(directory, wanted.manifest.clone(), &wanted.scene)
-        .map_err(Failure::bad_input)?;
-    fresh.filled(directory, is_new);
-    Ok(begun)
 }
 
 /// The device, and the commands that go to its bridge if it is behind the network.

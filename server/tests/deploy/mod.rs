@@ -335,4 +335,8 @@ fn what_meshes_are_read_with_is_in_the_archive_beside_them() {
         checked.status.success() && !said.contains("not drawn"),
         "{said}"
     );
+    // Without a library a mesh is read all the same.
+    fs::remove_file(place.path("scenes/parts/part.mtl")).expect("removed");
+    let (code, said) = deploy(&place, &["--force"]);
+    assert_eq!(code, Some(0), "{said}");
 }

@@ -78,7 +78,7 @@ pub(crate) fn read_mesh_and_look(path: &Path) -> Result<(RawMesh, FileLook), Fil
     Ok((mesh, look))
 }
 
-/// Names of the files that this mesh file is read with, relative to its folder, where they are there: libraries of materials, buffers.
+/// Names of the files that this mesh file is read with, relative to its folder, be they there or not: libraries of materials, buffers.
 /// None of a mesh that cannot be read: whoever reads it is told why.
 pub(crate) fn files_beside(path: &Path) -> Vec<String> {
     let named: fn(&[u8]) -> Vec<String> = match extension(path).as_str() {
@@ -89,7 +89,7 @@ pub(crate) fn files_beside(path: &Path) -> Vec<String> {
     let names = mesh_bytes(path).map_or_else(|_| Vec::new(), |bytes| named(&bytes));
     names
         .into_iter()
-        .filter(|name| is_below(Path::new(name)) && path.with_file_name(name).is_file())
+        .filter(|name| !name.is_empty() && is_below(Path::new(name)))
         .collect()
 }
 

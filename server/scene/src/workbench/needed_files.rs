@@ -23,7 +23,7 @@ pub enum NeededFile {
         name: String,
         /// The file.
         found: PathBuf,
-        /// A mesh of the scene names it, and not the scene: a library of materials, without which the mesh is read all the same, or a buffer.
+        /// A mesh of the scene names it, and not the scene: a buffer, or a library of materials, which may be missing: the mesh is read all the same.
         by_mesh: bool,
     },
 }
@@ -55,7 +55,7 @@ impl Workbench {
             }
             let read = Scene::named_or_file(scene)?;
             let by_scene = read.file_names();
-            for (name, found) in read.files()? {
+            for (name, found) in read.files_or_missing()? {
                 files.push(NeededFile::OfScene {
                     by_mesh: by_scene.iter().all(|(named, _)| *named != name),
                     scene: scene.to_owned(),
@@ -101,6 +101,13 @@ impl Workbench {
 impl Scene {
     /// The files that the scene names and that are not part of the program, and those that its meshes are read with: each name once, and where it is.
     pub fn files(&self) -> Result<Vec<(String, PathBuf)>, FileError> {
+        let mut files = self.files_or_missing()?;
+        files.retain(|(_, found)| found.is_file());
+        Ok(files)
+    }
+
+    /// The same with what a mesh names and is not there, where it would be.
+    fn files_or_missing(&self) -> Result<Vec<(String, PathBuf)>, FileError> {
         let mut files: Vec<(String, PathBuf)> = Vec::new();
         for (name, at) in self.file_names() {
             if self.is_in_program(name) || files.iter().any(|(known, _)| known == name) {

@@ -183,6 +183,11 @@ impl Plan<'_> {
                     (below(folder, &path)?, path, Mode::Secret)
                 }
                 NeededFile::OfScene {
+                    by_mesh: true,
+                    found,
+                    ..
+                } if !found.is_file() => continue,
+                NeededFile::OfScene {
                     scene, name, found, ..
                 } => {
                     let scene = Path::new(&scene);

@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_library_of_materials_that_is_gone_is_a_change_as_any() {
+    fn a_library_of_materials_that_goes_or_comes_is_a_change_as_any() {
         let place = tempfile::tempdir().expect("a directory");
         let write = |name: &str, text: &str| {
             std::fs::write(place.path().join(name), text).expect("written");
@@ -233,7 +233,10 @@ mod tests {
         write("a.mtl", "newmtl m\nKd 1 0 0\n");
         let (args, _) = followed_scene(place.path(), &format!("{BALL_ON_FLOOR}{seen}"));
         let (loader, mut watch) = following(args);
-        std::fs::remove_file(place.path().join("a.mtl")).expect("removed");
-        assert!(followed(&mut watch, &loader, || ()).is_some());
+        let library = place.path().join("a.mtl");
+        std::fs::remove_file(&library).expect("removed");
+        let without = followed(&mut watch, &loader, || ()).expect("another look");
+        let watch = without.files.expect("it follows");
+        assert!(watch.paths.contains(&library), "it may come back");
     }
 }

@@ -23,11 +23,14 @@ use std::sync::Arc;
 use god_object::World;
 use god_object::spatial::Pose;
 use taut_proto::scene::ScreenDescription;
+use taut_recording::{Recorder, RecordingError, Taps};
 
 use crate::loops::statistics::Statistics;
 use crate::loops::wiring::SharedView;
 use crate::session::head::Head;
+use crate::session::setup::RecordingSettings;
 use crate::shared::clock::SessionClock;
+use crate::shared::failure::Failure;
 use crate::shared::felt_ticks::FeltReader;
 
 /// Where the monitor is served and recorded.
@@ -58,11 +61,21 @@ impl FreshRecording {
         self.0.extend(file.map(Path::to_path_buf));
     }
 
-    /// The files of this directory were made just now, and it itself where `is_new`.
-    pub(crate) fn filled(&mut self, directory: &Path, is_new: bool) {
-        let files = fs::read_dir(directory).into_iter().flatten().flatten();
-        self.0.extend(files.map(|file| file.path()));
-        self.0.extend(is_new.then(|| directory.to_path_buf()));
+    /// Begins a recording that can be computed again. One that cannot be begun may have left files as well, as on a full disk; a directory that had
+    /// something in it is left alone.
+    pub(crate) fn begin(
+        &mut self,
+        wanted: &RecordingSettings,
+    ) -> Result<(Taps, Recorder), Failure> {
+        let directory = &wanted.directory;
+        let is_new = fs::symlink_metadata(directory).is_err();
+        let begun = Recorder::start(directory, wanted.manifest.clone(), &wanted.scene);
+        if !matches!(begun, Err(RecordingError::NotEmpty(_))) {
+            let files = fs::read_dir(directory).into_iter().flatten().flatten();
+            self.0.extend(files.map(|file| file.path()));
+            self.0.extend(is_new.then(|| directory.clone()));
+        }
+        begun.map_err(Failure::bad_input)
     }
 
     /// The session has begun: what it records stays.
