@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serialport::SerialPort;
 
-use super::frame::{Frame, LINE as LINE_BYTES, force_frame};
+use super::frame::{Frame, LINE as LINE_BYTES, force_frame, short_force_frame};
 use crate::devices::ArmState;
 use crate::devices::wire_thread::{ArmLine, ArmThread, Wire, WireThread};
 use crate::realtime::{Ticker, monotonic_now};
@@ -59,6 +59,7 @@ pub(crate) fn start(path: &str, priority: u8) -> Result<ArmThread, PolhemError> 
         judge: Counters::new(JUDGED.0),
         before: None,
         buffer: Vec::with_capacity(MAX_BUFFER),
+        line_bytes: LINE_BYTES,
     };
     let thread = WireThread::start("taut-polhem", priority, serial);
     thread.map_err(|error| PolhemError::Thread(error.to_string()))
@@ -85,6 +86,8 @@ struct Serial {
     /// Position and time of the line believed before, for the velocity.
     before: Option<([f64; 3], Duration)>,
     buffer: Vec<u8>,
+    /// Bytes of the board's lines; those to it have as many.
+    line_bytes: usize,
 }
 
 impl Wire for Serial {
@@ -111,9 +114,7 @@ impl Serial {
     /// Zero, as far as the line still takes it: said until it is answered, because a port that is closed may drop what it has not sent.
     fn let_go(&mut self, port: &mut Port) {
         for _ in 0..LAST_LINES {
-            let said = port
-                .write_all(&force_frame(&[0.0; 3]))
-                .and_then(|()| port.flush());
+            let said = self.say(port, &[0.0; 3]).and_then(|()| port.flush());
             if said.is_err() || self.newest_frame(port).is_err() {
                 return;
             }
@@ -127,7 +128,7 @@ impl Serial {
         while !line.is_over() {
             ticker.wait();
             let force = line.command(monotonic_now()).unwrap_or_default();
-            port.write_all(&force_frame(&force))?;
+            self.say(port, &force)?;
             if let Some(frame) = self.newest_frame(port)? {
                 let now = monotonic_now();
                 if self.take(now, &frame, line) {
@@ -145,6 +146,14 @@ impl Serial {
         Ok(())
     }
 
+    fn say(&self, port: &mut Port, force: &[f64; 3]) -> std::io::Result<()> {
+        if self.line_bytes == LINE_BYTES {
+            port.write_all(&force_frame(force))
+        } else {
+            port.write_all(&short_force_frame(force))
+        }
+    }
+
     /// The newest whole line; what is no line is dropped.
     fn newest_frame(&mut self, port: &mut Port) -> std::io::Result<Option<Frame>> {
         let mut chunk = [0; 4 * LINE_BYTES];
@@ -158,7 +167,10 @@ impl Serial {
         if self.buffer.len() > MAX_BUFFER {
             self.buffer.clear();
         }
-        Ok(newest)
+        Ok(newest.map(|(frame, bytes)| {
+            self.line_bytes = bytes;
+            frame
+        }))
     }
 
     /// Whether the frame is believed; if so it is handed on.

@@ -5,7 +5,9 @@
 //!   to the board     fx fy fz [mN]  2 0 0 0
 //! ```
 //!
-//! The orientation is Rz(tA) Ry(-lambda) Rx(tD) Ry(tE). There is no checksum: a line counts only if it has 64 bytes and eight numbers in range.
+//! The orientation is Rz(tA) Ry(-lambda) Rx(tD) Ry(tE). There is no checksum: a line counts only if it has its bytes and eight numbers in range.
+//!
+//! Lines of 63 bytes with one end, which the published program has as well, are understood, too; such a board is answered in lines of 63 bytes.
 //!
 //! Source: `haptikfabrikenapi` at b8d6c94, its micro API 0.2 (`uhaptikfabriken.h`).
 
@@ -15,6 +17,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 /// Of a line, its end included.
 pub(crate) const LINE: usize = 64;
+/// Of a line with one end alone.
+const SHORT_LINE: usize = LINE - 1;
 /// The command that goes with a force: 0 goes with currents, 1 sets counters.
 const FORCE: i32 = 2;
 /// Farthest cursor that is believed, mm along an axis: the workspace has a radius of 150.
@@ -38,8 +42,8 @@ pub struct Frame {
 /// Why a line is not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BrokenFrame {
-    /// Not 64 bytes with the line's end last.
-    #[error("a line of the Polhem board has not {LINE} bytes")]
+    /// Not 64 bytes, or 63, with the line's end last.
+    #[error("a line of the Polhem board has neither {LINE} bytes nor {SHORT_LINE}")]
     Length,
     /// Not eight numbers.
     #[error("a line of the Polhem board has not eight numbers")]
@@ -58,9 +62,14 @@ impl Frame {
         let [text @ .., b'\n'] = line else {
             return Err(BrokenFrame::Length);
         };
-        // Behind the numbers is another line's end; before them may be what is left of the line before.
+        // Behind the numbers of a long line is another end; before them may be what is left of the line before.
+        let is_whole = match line.len() {
+            LINE => true,
+            SHORT_LINE => !text.contains(&b'\n'),
+            _ => false,
+        };
         let text = text.trim_ascii();
-        if line.len() != LINE || text.contains(&b'\n') {
+        if !is_whole || text.contains(&b'\n') {
             return Err(BrokenFrame::Length);
         }
         let text = str::from_utf8(text).map_err(|_| BrokenFrame::Numbers)?;
@@ -95,17 +104,16 @@ impl Frame {
         })
     }
 
-    /// The newest line at the front of `buffer`, from which it and all before it are taken; what is no line is dropped.
-    pub(crate) fn newest(buffer: &mut Vec<u8>) -> Option<Self> {
+    /// The newest line at the front of `buffer`, with its bytes; it and all before it are taken, and what is no line is dropped.
+    pub(crate) fn newest(buffer: &mut Vec<u8>) -> Option<(Self, usize)> {
         let mut newest = None;
-        while let Some(line) = buffer.get(..LINE) {
-            let taken = match Self::parse(line) {
-                Ok(frame) => {
-                    newest = Some(frame);
-                    LINE
-                }
+        while buffer.len() >= SHORT_LINE {
+            let read = |bytes| Some((Self::parse(buffer.get(..bytes)?).ok()?, bytes));
+            let taken = match read(SHORT_LINE).or_else(|| read(LINE)) {
+                Some(found) => newest.insert(found).1,
+                None if buffer.len() < LINE => break,
                 // On from behind the next line's end.
-                Err(_) => match buffer.iter().position(|byte| *byte == b'\n') {
+                None => match buffer.iter().position(|byte| *byte == b'\n') {
                     Some(end) => end + 1,
                     None => break,
                 },
@@ -120,10 +128,11 @@ impl Frame {
     pub fn line(&self) -> Option<[u8; LINE]> {
         let [x, y, z] = self.position.map(|metres| metres * 1e3);
         let [a, b, c, d] = self.angles;
-        padded(&format!(
+        let numbers = format!(
             "{x:.3} {y:.3} {z:.3} {a:.4} {b:.4} {c:.4} {d:.4} {}\n",
             self.info
-        ))
+        );
+        padded(&numbers)
     }
 
     /// The orientation of the grip.
@@ -138,7 +147,7 @@ impl Frame {
     }
 }
 
-/// The line that commands a force, N; zero where it is not finite.
+/// The line that commands a force, N; zero where it is not finite. A board that speaks in lines of 63 bytes takes [`short_force_frame`].
 #[must_use]
 pub fn force_frame(force: &[f64; 3]) -> [u8; LINE] {
     let is_finite = force.iter().all(|part| part.is_finite());
@@ -149,6 +158,15 @@ pub fn force_frame(force: &[f64; 3]) -> [u8; LINE] {
     let mut text = String::with_capacity(LINE);
     let _ = write!(text, "{x} {y} {z} {FORCE} 0 0 0");
     padded(&text).unwrap_or([b' '; LINE]) // six digits each: it fits
+}
+
+/// [`force_frame`] in 63 bytes: a blank less.
+#[must_use]
+pub(crate) fn short_force_frame(force: &[f64; 3]) -> [u8; SHORT_LINE] {
+    let frame = force_frame(force);
+    let mut short = [b'\n'; SHORT_LINE];
+    short[..SHORT_LINE - 1].copy_from_slice(&frame[..SHORT_LINE - 1]);
+    short
 }
 
 /// The force that a line commands, N; `None` where it is none.
@@ -266,7 +284,7 @@ mod tests {
                 let mut found = Vec::new();
                 for bytes in [line(0), broken, line(2), line(3), line(4), line(5)] {
                     buffer.extend(bytes);
-                    found.extend(Frame::newest(&mut buffer));
+                    found.extend(Frame::newest(&mut buffer).map(|(read, _)| read));
                 }
                 let is_good = |read: &Frame| {
                     let sent = Frame::parse(&line(read.info));
@@ -276,5 +294,28 @@ mod tests {
                 assert_eq!(found.last().map(|read| read.info), Some(5), "at {at}");
             }
         }
+    }
+
+    #[test]
+    fn a_board_that_speaks_in_63_bytes_is_understood_and_answered_so() {
+        let text = |info: i32| format!("{:<62}\n", format!("1.5 -2 3 0.1 0.2 0.3 0.4 {info}"));
+        let mut buffer = Vec::new();
+        for info in 0..3 {
+            buffer.extend(text(info).into_bytes());
+            let (frame, bytes) = Frame::newest(&mut buffer).expect("at once");
+            assert_eq!((frame.info, bytes, buffer.len()), (info, 63, 0));
+        }
+        // Joined in the middle of a line.
+        buffer.extend(text(7)[40..].bytes().chain(text(8).bytes()));
+        buffer.extend(text(9).bytes());
+        assert_eq!(
+            Frame::newest(&mut buffer).map(|(frame, _)| frame.info),
+            Some(9)
+        );
+        let said = short_force_frame(&[1.0, -0.5, 0.25]);
+        assert_eq!(
+            said[..],
+            format!("{:<62}\n", "1000 -500 250 2 0 0 0").into_bytes()
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Polhem's text board (WoodenHaptics' newer electronics): lines of 64 bytes both ways over USB serial.
+//! Polhem's text board (WoodenHaptics' newer electronics): lines of 64 bytes (or 63) both ways over USB serial.
 //!
 //! | file           | what                                                           |
 //! |----------------|----------------------------------------------------------------|
