@@ -9,8 +9,8 @@ use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::{BridgeArgs, BridgeReport};
 use taut_link::create_key_file;
+use taut_test_kit::relay::{Impairment, Treatment, Waiting};
 
-use crate::relay::{Impairment, Waiting};
 use crate::support::{PATIENCE, shipped_workbench};
 use crate::wrench_in::{felt, sender};
 
@@ -43,15 +43,18 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
         ..Overrides::default()
     };
     let mut setup = session_setup(&workbench, key, &overrides).expect("a session");
-    let waiting = Waiting::new();
-    setup.link.announced_udp_port = Some(waiting.port());
+    let waiting = Waiting::bind().expect("a port");
+    setup.link.announced_udp_port = Some(waiting.address().port());
     let session = Session::start(setup).unwrap_or_else(|error| panic!("{error}"));
     let (quic, udp) = (session.quic_address(), session.udp_address());
     let impairment = Impairment {
-        delay_us,
+        delay: Duration::from_micros(delay_us),
         ..Impairment::default()
     };
-    let _relay = waiting.start(udp.expect("listens"), impairment, 7);
+    let treatments = vec![Treatment::both_ways(impairment)];
+    let _relay = waiting
+        .start(udp.expect("listens"), treatments, 7)
+        .expect("a relay");
     let server = quic.expect("listens").to_string();
     let word = |path: &Path| path.display().to_string();
     let (key, path) = (word(&key_path), word(&path));

@@ -1,9 +1,10 @@
 //! What the network and other programs do to a session: garbage, replay, damage, loss, sudden death.
 
-use crate::support::{relay::Impairment, *};
+use crate::support::*;
 use std::{net::UdpSocket, time::Duration};
 use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
 use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
+use taut_test_kit::relay::{Direction, Impairment};
 
 /// Sends states until `client` has `count` of them.
 async fn take_states(server: &ServerLink, client: &ClientLink, first: u64, count: usize) -> u64 {
@@ -59,7 +60,7 @@ async fn garbage_is_counted_and_has_no_effect() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
-    let (server, relay) = behind_relay(Impairment::default(), 1, |options| options).await;
+    let (server, relay) = behind_relay(Impairment::default(), 1).await;
     let mut inputs = server
         .device_inputs()
         .expect("the first taker gets the inputs");
@@ -99,21 +100,20 @@ async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_bad_network_costs_states_but_never_order_or_truth() {
     let impairment = Impairment {
-        lost: 50,
-        bursts: 0,
-        doubled: 50,
-        swapped: 50,
-        damaged: 50,
-        delay_us: 0,
+        lost: 0.05,
+        doubled: 0.05,
+        swapped: 0.05,
+        flipped: 0.05,
+        ..Impairment::default()
     };
-    let (server, relay) = behind_relay(impairment, 2, |options| options).await;
+    let (server, relay) = behind_relay(impairment, 2).await;
     let client = client(&server, Role::Render, "left").await;
     wait_until("path", || server.clients()[0].udp_address.is_some()).await;
     let mut states = Vec::new();
     broadcast_in_step_until(
         &mut server.broadcaster(),
         1,
-        || client.counters().states + relay.lost_down(),
+        || client.counters().states + lost_down(&relay),
         || {
             client.drain_states(&mut states);
             states.len() >= 600
@@ -122,14 +122,14 @@ async fn a_bad_network_costs_states_but_never_order_or_truth() {
     .await;
     assert_in_order(&states); // and equality with what was sent
     let counters = client.counters();
-    assert!(relay.lost_down() > 0 && relay.doubled_down() > 0);
+    let (lost, doubled) = (lost_down(&relay), relay.counts(Direction::Down).doubled);
+    assert!(lost > 0 && doubled > 0);
     assert!(
-        counters.lost > 0 && counters.lost <= relay.lost_down() + 1,
-        "{counters:?}, relay lost {}",
-        relay.lost_down()
+        counters.lost > 0 && counters.lost <= lost + 1,
+        "{counters:?}, relay lost {lost}"
     );
     assert!(
-        counters.duplicates > 0 && counters.duplicates <= relay.doubled_down() + 1,
+        counters.duplicates > 0 && counters.duplicates <= doubled + 1,
         "{counters:?}"
     );
     assert!(counters.late > 0, "{counters:?}");

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::random::Random;
+use crate::xorshift::Random;
 
 /// Vertices, m, and triangles.
 pub type Soup = (Vec<Point3<f64>>, Vec<[u32; 3]>);

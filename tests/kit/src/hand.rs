@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
-use crate::random::Random;
+use crate::xorshift::Random;
 
 /// A hand that presses a body towards the origin and slides it around, a step at a time.
 #[derive(Debug)]

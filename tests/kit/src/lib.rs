@@ -3,7 +3,9 @@
 mod clock;
 mod dense;
 mod hand;
-mod random;
+pub mod random;
+pub mod relay;
+mod xorshift;
 
 use std::fmt::Display;
 

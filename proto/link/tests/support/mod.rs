@@ -1,8 +1,7 @@
 //! A small scene, states, and a server on free ports of 127.0.0.1.
 
-pub mod relay;
-
 use std::{
+    net::SocketAddr,
     thread::JoinHandle,
     time::{Duration, Instant},
 };
@@ -16,6 +15,7 @@ use taut_proto::{
     scene::{BodyDescription, NodeDescription, ScreenDescription, Stereo, WindowDescription},
     state::{RunState, ToolState},
 };
+use taut_test_kit::relay::{Direction, Impairment, Relay, Treatment, Waiting};
 use tokio::runtime::Runtime;
 
 /// Only a hang takes this long; every wait ends as soon as its condition holds.
@@ -155,22 +155,35 @@ pub fn input(index: u64) -> InputSample {
     }
 }
 
+/// The clients' side of a relay, before the server's port is known.
+pub fn relay_port() -> Waiting {
+    Waiting::bind().unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A relay that treats every client so, both ways.
+pub fn start_relay(port: Waiting, server: SocketAddr, impairment: Impairment, seed: u64) -> Relay {
+    port.start(server, vec![Treatment::both_ways(impairment)], seed)
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
 /// A server whose hot plane is behind a relay.
-pub async fn behind_relay(
-    impairment: relay::Impairment,
-    seed: u64,
-    options: impl FnOnce(ServerOptions) -> ServerOptions,
-) -> (ServerLink, relay::Relay) {
-    let waiting = relay::Waiting::new();
-    let server = server_with(options(ServerOptions {
-        announced_udp_port: Some(waiting.port()),
+pub async fn behind_relay(impairment: Impairment, seed: u64) -> (ServerLink, Relay) {
+    let port = relay_port();
+    let server = server_with(ServerOptions {
+        announced_udp_port: Some(port.address().port()),
         idle_timeout: FORGIVING,
         node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
-    }))
+    })
     .await;
-    let relay = waiting.start(server.udp_addr(), impairment, seed);
+    let relay = start_relay(port, server.udp_addr(), impairment, seed);
     (server, relay)
+}
+
+/// The server's datagrams that did not arrive as they were sent.
+pub fn lost_down(relay: &Relay) -> u64 {
+    let counts = relay.counts(Direction::Down);
+    counts.all_lost() + counts.flipped
 }
 
 /// Sends states of growing tick until `done`, one per millisecond; gives up after [`PATIENCE`]. Returns the next tick.
