@@ -25,13 +25,11 @@ impl SlidingHand {
     const TWIST: f64 = 3.0_f64.to_radians();
 
     /// A hand at `pose`; its steps follow from the seed.
-    #[must_use]
     pub fn new(pose: Isometry3<f64>, seed: u64) -> Self {
         Self::with_steps(pose, seed, Self::STEP)
     }
 
     /// The same with its shortest and longest step, m.
-    #[must_use]
     pub fn with_steps(pose: Isometry3<f64>, seed: u64, step: [f64; 2]) -> Self {
         Self {
             pose,

@@ -8,13 +8,11 @@ pub struct Random(u64);
 
 impl Random {
     /// Numbers of a seed.
-    #[must_use]
     pub fn new(seed: u64) -> Random {
         Random(seed)
     }
 
     /// Numbers of a stream of a seed: streams of one seed have nothing to do with each other.
-    #[must_use]
     pub fn stream(seed: u64, stream: u64) -> Random {
         let mut of_seed = Random(seed);
         let mut of_stream = Random(of_seed.word() ^ stream.wrapping_mul(0xd134_2543_de82_ef95));

@@ -12,7 +12,6 @@ use crate::recipe::Recipe;
 pub const TRAINING: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
 
 /// The `count` start phases that a recipe is judged from: the middles of as many parts of a period, (2 k + 1) / (2 n).
-#[must_use]
 pub fn judged(count: u32) -> Vec<f64> {
     let phases = (0..count).map(|k| (f64::from(k) + 0.5) / f64::from(count));
     phases.collect()
@@ -99,7 +98,6 @@ impl Measured {
     }
 
     /// The largest value over the phases; NaN where one is.
-    #[must_use]
     pub fn worst(&self, measure: Measure) -> f64 {
         let values = self.phases.iter().map(|phase| phase.get(measure));
         values.fold(

@@ -24,7 +24,6 @@ pub struct HandError {
 
 impl HandError {
     /// 0.5 mm beside the path, 0.6 degrees askew, a tremor of 60 um rms on each axis between 8 and 12 Hz.
-    #[must_use]
     pub fn of_a_hand(seed: u64) -> Self {
         let mut random = Random(seed);
         Self {
@@ -36,7 +35,6 @@ impl HandError {
     }
 
     /// The same hand, resting on something.
-    #[must_use]
     pub fn without_tremor(&self) -> Self {
         Self {
             tremor: 0.0,
@@ -45,7 +43,6 @@ impl HandError {
     }
 
     /// Where the hand is that means to be at `pose`, with the share `constant` of offset and tilt.
-    #[must_use]
     pub fn at(&self, time: f64, pose: &Pose, constant: f64) -> Pose {
         let turn = UnitQuaternion::from_scaled_axis(self.tilt * constant);
         let moved = pose.translation.vector + self.offset * constant + self.tremor_at(time);

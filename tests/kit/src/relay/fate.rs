@@ -44,7 +44,6 @@ pub struct Fates {
 
 impl Fates {
     /// Fates by `seed` of the flow of this number.
-    #[must_use]
     pub fn new(impairment: Impairment, seed: u64, flow: u64, direction: Direction) -> Fates {
         let stream = 2 * flow + u64::from(direction == Direction::Down);
         Fates {

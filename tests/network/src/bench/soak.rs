@@ -75,9 +75,6 @@ struct Member {
 }
 
 /// Runs until `log` is as old as `duration`, decided by `seed`.
-///
-/// # Errors
-/// The server does not come about, does not let somebody go, or the log cannot be written.
 pub fn run(duration: Duration, seed: u64, log: &mut SoakLog) -> Result<Soak, BenchError> {
     let runtime = runtime(2)?;
     let keys = [ClusterKey::generate()?, ClusterKey::generate()?];

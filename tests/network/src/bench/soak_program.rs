@@ -56,9 +56,6 @@ pub struct ProgramSoak {
 }
 
 /// Runs `program` until `log` is as old as `duration`, decided by `seed`.
-///
-/// # Errors
-/// The program does not start, ends by itself or does not come back; the log cannot be written.
 pub fn run(
     program: &Path,
     duration: Duration,
