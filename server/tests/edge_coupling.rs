@@ -8,7 +8,6 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::support::{PATIENCE, shipped_workbench};
-use clap::Parser;
 use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::DeviceSource;
@@ -34,12 +33,6 @@ const RAMPED_IN: Duration = Duration::from_millis(900);
 const STALL_US: u64 = 8_000;
 /// Runs until one without a safety event.
 const ATTEMPTS: u32 = 4;
-
-#[derive(Parser)]
-struct Cli {
-    #[command(flatten)]
-    args: BridgeArgs,
-}
 
 /// What was seen of one run.
 struct Run {
@@ -111,7 +104,7 @@ fn run(coupling: &str) -> Run {
         "--passivity",
         "observe",
     ];
-    let args = Cli::try_parse_from(words).expect("valid").args;
+    let args = BridgeArgs::of_words(words).expect("valid");
     let bridge = std::thread::Builder::new()
         .name("bridge".to_owned())
         .spawn(move || taut_bridge::run(&args))

@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
@@ -13,12 +12,6 @@ use taut_test_kit::relay::{Impairment, Treatment, Waiting};
 
 use crate::support::{PATIENCE, shipped_workbench};
 use crate::wrench_in::{felt, sender};
-
-#[derive(Parser)]
-struct Cli {
-    #[command(flatten)]
-    args: BridgeArgs,
-}
 
 /// What the hand of a bridge felt along x, N, tick by tick, of a source of 1 N that is killed once it was felt for a second; source and bridge are `delay_us`
 /// away from the server, each.
@@ -77,7 +70,7 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
         "--give-up",
         "20",
     ];
-    let args = Cli::try_parse_from(words).expect("valid").args;
+    let args = BridgeArgs::of_words(words).expect("valid");
     let bridge = std::thread::Builder::new()
         .spawn(move || taut_bridge::run(&args))
         .expect("a thread");
