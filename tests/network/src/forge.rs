@@ -70,7 +70,7 @@ pub struct Forger {
 impl Forger {
     /// A forger whose own key is of the same epoch and sender as the one that it forges.
     pub fn new(seed: u64, epoch: u32, sender: u16) -> Forger {
-        let mut random = Random::new(seed);
+        let mut random = Random(seed);
         let mut material = [0; KEY_MATERIAL_BYTES];
         random.fill(&mut material);
         Forger {
@@ -177,7 +177,7 @@ impl OneWay {
     /// Keys by a seed.
     pub fn new(seed: u64, epoch: u32, sender: u16) -> OneWay {
         let mut material = [0; KEY_MATERIAL_BYTES];
-        Random::new(seed).fill(&mut material);
+        Random(seed).fill(&mut material);
         OneWay {
             sealer: Sealer::new(&material, epoch, sender),
             opener: Opener::new(&material, epoch, sender),

@@ -62,7 +62,7 @@ pub fn run(
     seed: u64,
     log: &mut SoakLog,
 ) -> Result<ProgramSoak, BenchError> {
-    let mut random = Random::new(seed ^ log.elapsed_s().to_bits());
+    let mut random = Random(seed ^ log.elapsed_s().to_bits());
     let life_s = (LIFE_SHARE * duration.as_secs_f64()).clamp(LIFE_S.0, LIFE_S.1);
     let this = log.name("nodes");
     let mut cast = Cast::start(program, log)?;
