@@ -2,21 +2,9 @@
 
 use crate::support::*;
 use std::{net::UdpSocket, time::Duration};
-use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
+use taut_link::{LinkEvent, Role, ServerOptions};
 use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
 use taut_test_kit::relay::{Direction, Impairment};
-
-/// Sends states until `client` has `count` of them.
-async fn take_states(server: &ServerLink, client: &ClientLink, first: u64, count: usize) -> u64 {
-    let mut states = Vec::new();
-    let next = broadcast_until(&mut server.broadcaster(), first, || {
-        client.drain_states(&mut states);
-        states.len() >= count
-    })
-    .await;
-    assert_in_order(&states);
-    next
-}
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn garbage_is_counted_and_has_no_effect() {
@@ -24,7 +12,7 @@ async fn garbage_is_counted_and_has_no_effect() {
     let client = client(&server, Role::Render, "left").await;
     let tick = take_states(&server, &client, 1, 20).await;
 
-    let socket = UdpSocket::bind("127.0.0.1:0").unwrap_or_else(|error| panic!("{error}"));
+    let socket = must(UdpSocket::bind("127.0.0.1:0"));
     let throw = |bytes: &[u8]| assert!(socket.send_to(bytes, server.udp_addr()).is_ok());
     let header = |version: u8, sender: u8| {
         let mut bytes = vec![0; 24 + 16];
@@ -83,7 +71,7 @@ async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
     let path = server.clients()[0].udp_address;
     let newest = *inputs.read();
     let before = server.counters();
-    let thief = UdpSocket::bind("127.0.0.1:0").unwrap_or_else(|error| panic!("{error}"));
+    let thief = must(UdpSocket::bind("127.0.0.1:0"));
     for datagram in &stolen {
         assert!(thief.send_to(datagram, server.udp_addr()).is_ok());
     }
@@ -144,19 +132,18 @@ fn murdered_client(options: taut_link::ClientOptions, life: Duration) {
     let died = std::thread::Builder::new()
         .name("victim".to_owned())
         .spawn(move || {
-            let runtime = tokio::runtime::Builder::new_multi_thread()
-                .worker_threads(1)
-                .enable_all()
-                .build()
-                .unwrap_or_else(|error| panic!("{error}"));
-            let link = runtime
-                .block_on(taut_link::connect(options))
-                .unwrap_or_else(|error| panic!("{error}"));
+            let runtime = must(
+                tokio::runtime::Builder::new_multi_thread()
+                    .worker_threads(1)
+                    .enable_all()
+                    .build(),
+            );
+            let link = must(runtime.block_on(taut_link::connect(options)));
             std::thread::sleep(life);
             runtime.shutdown_background();
             drop(link);
         });
-    let died = died.unwrap_or_else(|error| panic!("{error}"));
+    let died = must(died);
     assert!(died.join().is_ok());
 }
 
@@ -216,20 +203,19 @@ async fn a_restarted_node_takes_the_place_of_its_silent_self() {
     let first = options.clone();
     tokio::task::block_in_place(|| murdered_client(first, Duration::from_millis(200)));
     tokio::time::sleep(Duration::from_millis(600)).await; // silent for longer than the server forgives
-    let again = taut_link::connect(options)
-        .await
-        .unwrap_or_else(|error| panic!("{error}"));
+    let again = must(taut_link::connect(options).await);
     assert_eq!(server.clients().len(), 1);
     take_states(&server, &again, 1, 20).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_dead_server_is_noticed() {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .unwrap_or_else(|error| panic!("{error}"));
+    let runtime = must(
+        tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build(),
+    );
     let (to_us, from_it) = tokio::sync::oneshot::channel();
     let host = runtime.spawn(async move {
         let server = server().await;
@@ -239,9 +225,7 @@ async fn a_dead_server_is_noticed() {
         drop(server);
     });
     let options = from_it.await.expect("no server");
-    let client = taut_link::connect(options)
-        .await
-        .unwrap_or_else(|error| panic!("{error}"));
+    let client = must(taut_link::connect(options).await);
     // Its endpoint dies with its runtime and says nothing.
     runtime.shutdown_background();
     drop(host);

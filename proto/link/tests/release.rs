@@ -16,10 +16,6 @@ use taut_test_kit::relay::Impairment;
 const VERSION_3: &str = include_str!("../../tests/golden_version_3.txt");
 const NEXT: u8 = PROTOCOL_VERSION + 1;
 
-fn must<T, E: std::fmt::Display>(result: Result<T, E>) -> T {
-    result.unwrap_or_else(|error| panic!("{error}"))
-}
-
 fn range(min: u8, max: u8) -> VersionRange {
     VersionRange::new(min, max).expect("a range")
 }
