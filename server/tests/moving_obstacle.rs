@@ -12,7 +12,7 @@ use taut::loops::wiring::WiredLoops;
 use taut::session::broadcast::StateWriter;
 use taut::session::head::{HeadMotion, HeadSource};
 use taut_bridge::{
-    AtEnd, Device, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow, ViaPoint,
+    AtEnd, Device, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceSample, ViaPoint,
 };
 use taut_proto::PoseF32;
 use taut_scene::{BuiltMotion, BuiltScene, Scene};
@@ -52,8 +52,8 @@ fn yielding_hand(scene: &BuiltScene) -> Box<dyn Device> {
 
 /// A hand that nothing moves.
 fn rigid_hand(scene: &BuiltScene) -> Box<dyn Device> {
-    let rows = vec![TraceRow {
-        time_s: 0.0,
+    let rows = vec![TraceSample {
+        time: 0.0,
         pose: scene.start,
         buttons: 0,
     }];
