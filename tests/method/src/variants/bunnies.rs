@@ -102,7 +102,7 @@ impl Slide {
         let settings = Settings::for_size(SIZE);
         let mut god_object =
             GodObject::new(Arc::clone(world), settings, start).expect("apart at the start");
-        let mut hand = SlidingHand::with_steps(start, 1, self.step);
+        let mut hand = SlidingHand::new(start, 1, self.step);
         for k in 0..APPROACH + self.updates {
             let device = hand.next(god_object.pose());
             step(k, &mut god_object, &device);
