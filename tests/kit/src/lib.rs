@@ -5,6 +5,7 @@ mod dense;
 mod hand;
 pub mod random;
 pub mod relay;
+pub mod strings;
 mod xorshift;
 
 use std::fmt::Display;
