@@ -99,13 +99,7 @@ impl Measured {
 
     /// The largest value over the phases; NaN where one is.
     pub fn worst(&self, measure: Measure) -> f64 {
-        let values = self.phases.iter().map(|phase| phase.get(measure));
-        values.fold(
-            f64::NEG_INFINITY,
-            |a, b| {
-                if a.is_nan() || a > b { a } else { b }
-            },
-        )
+        largest(self.phases.iter().map(|phase| phase.get(measure)))
     }
 
     /// Times, number of probes, then measures and probes phase by phase.
@@ -143,6 +137,14 @@ impl Measured {
             },
         })
     }
+}
+
+/// The largest of the values; NaN where one is.
+pub(crate) fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(
+        f64::NEG_INFINITY,
+        |a, b| if a.is_nan() || a > b { a } else { b },
+    )
 }
 
 /// Of so many updates, which took `charged` of `spanned` s on the virtual clock.

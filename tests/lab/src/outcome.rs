@@ -2,7 +2,7 @@
 
 use crate::clock::RATES;
 use crate::measure::{Measure, Measures};
-use crate::measured::{Load, Measured, Payer, TRAINING, Times, judged};
+use crate::measured::{Load, Measured, Payer, TRAINING, Times, judged, largest};
 use crate::method::{Method, Tuning};
 use crate::recipe::{Ideal, Line, Recipe};
 use crate::reference::{FORCE_ERROR, TORQUE_ERROR};
@@ -176,13 +176,7 @@ impl Outcome {
 
     /// The largest value over the phases; NaN where one is.
     pub fn worst(&self, measure: Measure) -> f64 {
-        let values = self.phases.iter().map(|phase| phase.get(measure));
-        values.fold(
-            f64::NEG_INFINITY,
-            |a, b| {
-                if a.is_nan() || a > b { a } else { b }
-            },
-        )
+        largest(self.phases.iter().map(|phase| phase.get(measure)))
     }
 
     /// The mean over the phases.
@@ -193,11 +187,7 @@ impl Outcome {
 
     /// The largest value of a probe over the phases; NaN where one is.
     fn worst_probe(&self, probe: usize) -> f64 {
-        let values = self.phases.iter().map(|phase| phase.probes[probe]);
-        values.fold(
-            f64::NEG_INFINITY,
-            |a, b| if a.is_nan() || a > b { a } else { b },
-        )
+        largest(self.phases.iter().map(|phase| phase.probes[probe]))
     }
 
     /// Names of the lines and probes that it missed.
