@@ -346,12 +346,11 @@ fn command(newest: &Newest) -> Command {
 mod tests {
     use super::*;
     use crate::device::{Device, Pose};
-    use crate::devices::{
-        AtEnd, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow,
-    };
+    use crate::devices::{AtEnd, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice};
     use crate::edge::{floor, offer};
     use crate::port::{EventKind, SafetySettings};
     use nalgebra::Point3;
+    use taut_recording::TraceSample;
 
     fn ms(time: u64) -> Duration {
         Duration::from_millis(time)
@@ -460,9 +459,9 @@ mod tests {
 
     #[test]
     fn a_faulty_device_is_told_once_and_flagged_on_every_reading() {
-        let row = |time_s| TraceRow {
-            time_s,
-            pose: Pose::translation(0.0, 0.0, time_s),
+        let row = |time| TraceSample {
+            time,
+            pose: Pose::translation(0.0, 0.0, time),
             buttons: 0,
         };
         let trace = vec![row(0.0), row(0.01)];

@@ -1,5 +1,6 @@
 //! The arguments of `taut bridge`, and what its process prints and returns.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -197,18 +198,27 @@ fn parse_passivity(text: &str) -> Result<Passivity, String> {
 }
 
 impl BridgeArgs {
-    /// The arguments of `taut bridge --server SERVER --node NODE`, all others as when they are left out.
-    #[must_use]
-    pub fn joining(server: &str, node: &str) -> Option<Self> {
+    /// The arguments in the words of a command line, the program's name first.
+    ///
+    /// # Errors
+    /// Words that `taut bridge` does not take, told as on a command line.
+    pub fn of_words<W: Into<OsString> + Clone>(
+        words: impl IntoIterator<Item = W>,
+    ) -> Result<Self, clap::Error> {
         #[derive(clap::Parser)]
         struct Line {
             #[command(flatten)]
             args: BridgeArgs,
         }
+        <Line as clap::Parser>::try_parse_from(words).map(|line| line.args)
+    }
+
+    /// The arguments of `taut bridge --server SERVER --node NODE`, all others as when they are left out.
+    #[must_use]
+    pub fn joining(server: &str, node: &str) -> Option<Self> {
         let server = format!("--server={server}");
         let node = format!("--node={node}");
-        let line = <Line as clap::Parser>::try_parse_from(["taut-bridge", &server, &node]);
-        line.ok().map(|line| line.args)
+        Self::of_words(["taut-bridge", &server, &node]).ok()
     }
 }
 
@@ -255,17 +265,9 @@ pub fn execute(args: &BridgeArgs) -> ExitCode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
-
-    #[derive(clap::Parser)]
-    struct Cli {
-        #[command(flatten)]
-        args: BridgeArgs,
-    }
 
     fn parse(words: &[&str]) -> Result<BridgeArgs, clap::Error> {
-        let words = ["taut-bridge"].iter().chain(words);
-        Cli::try_parse_from(words).map(|cli| cli.args)
+        BridgeArgs::of_words(["taut-bridge"].iter().chain(words))
     }
 
     #[test]

@@ -69,8 +69,8 @@ pub use devices::{
     ArmDevice, ArmPort, ArmSettings, ArmState, AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand,
     HandPreset, HaplySettings, HeldStrings, MAX_EDGE_DELAY, MinJerkPath, Motors, PathError,
     PluginSettings, PolhemSettings, Progress, RecordedDevice, RemoteDevice, SimulatedDevice,
-    SpidarDevice, SpidarPlacement, SpidarUartError, SpidarUartSettings, Trace, TraceError,
-    TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint, haply_limits, min_jerk, string_grip,
+    SpidarDevice, SpidarPlacement, SpidarUartError, SpidarUartSettings, Trace, TraceError, Tremor,
+    TremorMotion, UnknownHand, ViaPoint, haply_limits, min_jerk, string_grip,
 };
 pub use external::{
     ExternalWrench, ExternalWrenchSettings, ExternalWrenchStatistics, JudgedWrench, MAX_AHEAD,
@@ -87,5 +87,6 @@ pub use port::{
 pub use report::{BridgeReport, Quantiles};
 pub use simulate::{SimulateArgs, execute_simulation};
 pub use simulated_strings::{SimulatedSpidar, StringsError, simulated_spidar, string_geometry};
+pub use taut_recording::TraceSample;
 pub use trace_file::{TraceFileError, read_trace, via_points};
 pub use vrpn::{TrackerFeed, TrackerState, UnknownVrpnMode, VrpnMode, VrpnSource};

@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use taut_recording::{MAX_TRACE_BYTES, TraceFault, parse_trace};
+use taut_recording::{MAX_TRACE_BYTES, TraceFault, TraceSample, parse_trace};
 
-use crate::devices::{Trace, TraceRow, ViaPoint};
+use crate::devices::{Trace, ViaPoint};
 
 /// Why a trace file was not read.
 #[derive(Debug, thiserror::Error)]
@@ -45,12 +45,7 @@ pub fn read_trace(path: &Path) -> Result<Trace, TraceFileError> {
             text: "is no trace".to_owned(),
         }),
     })?;
-    let row = |sample: &taut_recording::TraceSample| TraceRow {
-        time_s: sample.time,
-        pose: sample.pose,
-        buttons: sample.buttons,
-    };
-    Ok(rows.samples.iter().map(row).collect())
+    Ok(rows.samples)
 }
 
 fn read_text(path: &Path) -> io::Result<String> {
@@ -69,12 +64,12 @@ fn read_text(path: &Path) -> io::Result<String> {
 
 /// The rows of a trace as via points of a hand's intention; their times count from the first row.
 #[must_use]
-pub fn via_points(trace: &[TraceRow]) -> Vec<ViaPoint> {
-    let start_s = trace.first().map_or(0.0, |row| row.time_s);
+pub fn via_points(trace: &[TraceSample]) -> Vec<ViaPoint> {
+    let start_s = trace.first().map_or(0.0, |row| row.time);
     trace
         .iter()
         .map(|row| ViaPoint {
-            time_s: row.time_s - start_s,
+            time_s: row.time - start_s,
             pose: row.pose,
         })
         .collect()

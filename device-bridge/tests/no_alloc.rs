@@ -8,7 +8,7 @@ use taut_bridge::edge::EdgeCoupler;
 use taut_bridge::{
     ArmDevice, ArmPort, ArmState, AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits,
     DevicePort, DeviceSample, Grip, Hand, HaplySettings, MinJerkPath, Passivity, PassivitySettings,
-    Placement, Pose, RecordedDevice, RemoteDevice, SafetySettings, SimulatedDevice, TraceRow,
+    Placement, Pose, RecordedDevice, RemoteDevice, SafetySettings, SimulatedDevice, TraceSample,
     Tremor,
 };
 use taut_link::DeviceInput;
@@ -61,8 +61,8 @@ fn a_simulated_device_does_not_allocate() {
 
 #[test]
 fn a_recorded_device_does_not_allocate() {
-    let row = |index: u32| TraceRow {
-        time_s: f64::from(index) * 0.013,
+    let row = |index: u32| TraceSample {
+        time: f64::from(index) * 0.013,
         pose: Pose::translation(0.0, 0.0, 1e-2 * f64::from(index % 3)),
         buttons: 0,
     };

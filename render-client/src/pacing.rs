@@ -176,7 +176,7 @@ impl FrameHeads {
 mod tests {
     use super::*;
     use crate::node_status::LinkHealth;
-    use nalgebra::{Isometry3, Vector3};
+    use nalgebra::Isometry3;
     use proptest::prelude::*;
 
     const MS: u64 = 1_000_000;
@@ -200,16 +200,12 @@ mod tests {
         State {
             time_ns,
             source: (frame, 0),
-            god_object: Isometry3::identity(),
-            device: Isometry3::identity(),
-            force: Vector3::zeros(),
             head: Some(Head {
                 pose: Isometry3::translation(place(sample_ns), -1.3, 0.9),
                 eye_separation: 0.064,
                 sample_ns,
             }),
-            bodies: Vec::new(),
-            contacts: Vec::new(),
+            ..Latched::at_rest(Isometry3::identity()).state
         }
     }
 

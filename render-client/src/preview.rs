@@ -303,22 +303,28 @@ fn axes(azimuth: f64) -> [Vector3<f64>; 3] {
     [right, to_eye.cross(&right), to_eye]
 }
 
+impl Latched {
+    /// The god-object at `pose` and the device with it, without a force, and everything else where it was described.
+    pub fn at_rest(pose: Isometry3<f64>) -> Self {
+        Self {
+            sample_ns: 0,
+            state: State {
+                time_ns: 0,
+                source: (0, 0),
+                god_object: pose,
+                device: pose,
+                force: Vector3::zeros(),
+                head: None,
+                bodies: Vec::new(),
+                contacts: Vec::new(),
+            },
+            held: false,
+            stale: false,
+        }
+    }
+}
+
 /// The scene at its start: everything where it was described.
 pub(crate) fn at_start(stage: &Stage) -> Latched {
-    let pose: Isometry3<f64> = stage.god_object.pose;
-    Latched {
-        sample_ns: 0,
-        state: State {
-            time_ns: 0,
-            source: (0, 0),
-            god_object: pose,
-            device: pose,
-            force: Vector3::zeros(),
-            head: None,
-            bodies: Vec::new(),
-            contacts: Vec::new(),
-        },
-        held: false,
-        stale: false,
-    }
+    Latched::at_rest(stage.god_object.pose)
 }

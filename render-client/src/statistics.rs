@@ -346,26 +346,14 @@ impl std::fmt::Display for RenderReport {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::timeline::State;
-    use nalgebra::{Isometry3, Vector3};
+    use nalgebra::Isometry3;
 
     fn shown(sample_ns: u64) -> Latched {
-        let state = State {
-            time_ns: sample_ns + 500_000,
-            source: (sample_ns, 7),
-            god_object: Isometry3::identity(),
-            device: Isometry3::identity(),
-            force: Vector3::zeros(),
-            head: None,
-            bodies: Vec::new(),
-            contacts: Vec::new(),
-        };
-        Latched {
-            state,
-            sample_ns,
-            held: false,
-            stale: false,
-        }
+        let mut shown = Latched::at_rest(Isometry3::identity());
+        shown.sample_ns = sample_ns;
+        shown.state.time_ns = sample_ns + 500_000;
+        shown.state.source = (sample_ns, 7);
+        shown
     }
 
     #[test]

@@ -225,12 +225,7 @@ mod tests {
         State {
             time_ns,
             source: (time_ns, 0),
-            god_object: pose,
-            device: pose,
-            force: Vector3::zeros(),
-            head: None,
-            bodies: Vec::new(),
-            contacts: Vec::new(),
+            ..Latched::at_rest(pose).state
         }
     }
 

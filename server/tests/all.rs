@@ -17,13 +17,6 @@ mod operator;
 mod own_device;
 mod record;
 mod recording;
-#[allow(
-    dead_code,
-    unused_imports,
-    reason = "shared with another package, which uses the rest"
-)]
-#[path = "../../proto/link/tests/support/relay.rs"]
-mod relay;
 mod replay;
 mod scheduling;
 mod session;

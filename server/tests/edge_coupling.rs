@@ -7,9 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crate::relay::{Impairment, Waiting};
 use crate::support::{PATIENCE, shipped_workbench};
-use clap::Parser;
 use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::DeviceSource;
@@ -18,6 +16,7 @@ use taut_bridge::{BridgeArgs, BridgeReport, DeviceLimits, MAX_EDGE_DELAY};
 use taut_link::{ClientOptions, Role, connect, create_key_file};
 use taut_proto::state::RunState;
 use taut_test_kit::BALL_ON_FLOOR;
+use taut_test_kit::relay::{Direction, Impairment, Treatment, Waiting};
 
 const STIFFNESS: f64 = 1000.0;
 const RADIUS: f64 = 0.02;
@@ -34,12 +33,6 @@ const RAMPED_IN: Duration = Duration::from_millis(900);
 const STALL_US: u64 = 8_000;
 /// Runs until one without a safety event.
 const ATTEMPTS: u32 = 4;
-
-#[derive(Parser)]
-struct Cli {
-    #[command(flatten)]
-    args: BridgeArgs,
-}
 
 /// What was seen of one run.
 struct Run {
@@ -76,17 +69,18 @@ fn run(coupling: &str) -> Run {
         limits: DeviceLimits::UNLIMITED,
         max_age: MAX_EDGE_DELAY,
     };
-    let waiting = Waiting::new();
-    setup.link.announced_udp_port = Some(waiting.port());
+    let waiting = Waiting::bind().expect("a port");
+    setup.link.announced_udp_port = Some(waiting.address().port());
     let mut session = Session::start(setup).unwrap_or_else(|error| panic!("{error}"));
     let (quic, udp) = (session.quic_address(), session.udp_address());
     let (quic, udp) = (quic.expect("listens"), udp.expect("listens"));
     let impairment = Impairment {
-        lost: 50,
-        delay_us: 20_000,
+        lost: 0.05,
+        delay: Duration::from_millis(20),
         ..Impairment::default()
     };
-    let relay = waiting.start(udp, impairment, 7);
+    let treatments = vec![Treatment::both_ways(impairment)];
+    let relay = waiting.start(udp, treatments, 7).expect("a relay");
 
     let (canary, awake) = canary();
     let server = quic.to_string();
@@ -110,7 +104,7 @@ fn run(coupling: &str) -> Run {
         "--passivity",
         "observe",
     ];
-    let args = Cli::try_parse_from(words).expect("valid").args;
+    let args = BridgeArgs::of_words(words).expect("valid");
     let bridge = std::thread::Builder::new()
         .name("bridge".to_owned())
         .spawn(move || taut_bridge::run(&args))
@@ -120,7 +114,7 @@ fn run(coupling: &str) -> Run {
         .join()
         .expect("no panic")
         .unwrap_or_else(|error| panic!("{error}"));
-    let lost_down = relay.lost_down();
+    let lost_down = relay.counts(Direction::Down).all_lost();
     session.follow_network(&Terminal::standard_error());
     let (of_session, failure) = session.stop(&Terminal::standard_error());
     assert!(failure.is_none());

@@ -14,12 +14,12 @@ use taut_bridge::{
 };
 use taut_scene::{BuiltScene, Scene};
 
-const TICK: Duration = Duration::from_millis(1);
+pub(crate) const TICK: Duration = Duration::from_millis(1);
 
 /// The session's loops, ticked in the order in which their threads would run.
-struct VirtualSession {
-    loops: WiredLoops,
-    now: Duration,
+pub(crate) struct VirtualSession {
+    pub(crate) loops: WiredLoops,
+    pub(crate) now: Duration,
 }
 
 fn sphere_on_plane() -> BuiltScene {
@@ -50,7 +50,7 @@ fn pressing_hand(scene: &BuiltScene) -> SimulatedDevice {
 }
 
 impl VirtualSession {
-    fn new(scene: &BuiltScene, device: Box<dyn Device>, start: &Pose) -> Self {
+    pub(crate) fn new(scene: &BuiltScene, device: Box<dyn Device>, start: &Pose) -> Self {
         let world = Arc::new(scene.world.clone());
         let god_object = GodObject::new(world.clone(), scene.settings, *start)
             .unwrap_or_else(|error| panic!("{error}"));
@@ -66,7 +66,7 @@ impl VirtualSession {
     }
 
     /// One millisecond: loop 3, loop 2; loop 1 only every `god_object_ticks`.
-    fn tick(&mut self, god_object_ticks: u32) {
+    pub(crate) fn tick(&mut self, god_object_ticks: u32) {
         self.now += TICK;
         let now = self.now;
         self.loops.haptics.tick(now);

@@ -3,21 +3,20 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::loops::{TICK, VirtualSession};
 use god_object::spatial::linear;
-use god_object::{GodObject, Pose, World};
+use god_object::{Pose, World};
 use taut::commands::replay::Replay;
 use taut::loops::checker::PenetrationChecker;
 use taut::loops::wiring::WiredLoops;
 use taut::session::broadcast::StateWriter;
 use taut::session::head::{HeadMotion, HeadSource};
 use taut_bridge::{
-    AtEnd, Device, Grip, Hand, MinJerkPath, RecordedDevice, SafetySettings, SimulatedDevice,
-    TraceRow, ViaPoint,
+    AtEnd, Device, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceSample, ViaPoint,
 };
 use taut_proto::PoseF32;
 use taut_scene::{BuiltMotion, BuiltScene, Scene};
 
-const TICK: Duration = Duration::from_millis(1);
 /// Index of the plate among the scene's obstacles: the wall comes first.
 const PLATE: usize = 1;
 
@@ -53,8 +52,8 @@ fn yielding_hand(scene: &BuiltScene) -> Box<dyn Device> {
 
 /// A hand that nothing moves.
 fn rigid_hand(scene: &BuiltScene) -> Box<dyn Device> {
-    let rows = vec![TraceRow {
-        time_s: 0.0,
+    let rows = vec![TraceSample {
+        time: 0.0,
         pose: scene.start,
         buttons: 0,
     }];
@@ -64,37 +63,11 @@ fn rigid_hand(scene: &BuiltScene) -> Box<dyn Device> {
     }
 }
 
-struct VirtualSession {
-    loops: WiredLoops,
-    now: Duration,
-}
-
-impl VirtualSession {
-    fn new(scene: &BuiltScene, device: Box<dyn Device>) -> Self {
-        let world = Arc::new(scene.world.clone());
-        let god_object = GodObject::new(world.clone(), scene.settings, scene.start)
-            .unwrap_or_else(|error| panic!("{error}"));
-        let safety = SafetySettings {
-            ramp_in: Duration::from_millis(10),
-            ..SafetySettings::default()
-        };
-        Self {
-            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety, None)
-                .with_motions(scene.motions.clone()),
-            // A session is some time old when its loops begin.
-            now: Duration::from_millis(300),
-        }
-    }
-
-    /// One millisecond: loop 3, loop 2; loop 1 only every `god_object_ticks`.
-    fn tick(&mut self, god_object_ticks: u32) {
-        self.now += TICK;
-        let now = self.now;
-        self.loops.haptics.tick(now);
-        self.loops.coupling.tick(now);
-        if now.as_millis().is_multiple_of(u128::from(god_object_ticks)) {
-            self.loops.god_object.tick(|| now);
-        }
+/// A session is some time old when its loops begin.
+fn session_of(scene: &BuiltScene, device: Box<dyn Device>) -> VirtualSession {
+    VirtualSession {
+        now: Duration::from_millis(300),
+        ..VirtualSession::new(scene, device, &scene.start)
     }
 }
 
@@ -111,7 +84,7 @@ fn the_plate_pushes_the_hand_without_penetration_at_any_god_object_rate() {
     let checker = checker(&scene.world);
     // Even at an update each 0.2 s, where the plate goes 20 mm at once.
     for god_object_ticks in [1, 4, 14, 200] {
-        let mut session = VirtualSession::new(&scene, yielding_hand(&scene));
+        let mut session = session_of(&scene, yielding_hand(&scene));
         let (mut largest, mut highest, mut largest_step): (f64, f64, f64) = (0.0, 0.0, 0.0);
         let mut last = 0.0;
         let begun = session.now;
@@ -159,7 +132,7 @@ fn the_plate_pushes_the_hand_without_penetration_at_any_god_object_rate() {
 fn an_update_that_comes_late_moves_the_plate_the_whole_way_and_through_nothing() {
     let scene = scene();
     let checker = checker(&scene.world);
-    let mut session = VirtualSession::new(&scene, rigid_hand(&scene));
+    let mut session = session_of(&scene, rigid_hand(&scene));
     for _ in 0..1100 {
         session.tick(1);
     }
@@ -184,7 +157,7 @@ fn an_update_that_comes_late_moves_the_plate_the_whole_way_and_through_nothing()
 fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
     let scene = scene();
     let motion = motion(&scene);
-    let session = VirtualSession::new(&scene, yielding_hand(&scene));
+    let session = session_of(&scene, yielding_hand(&scene));
     let source = HeadSource {
         rest: Pose::identity(),
         eye_separation: 0.064,
@@ -232,7 +205,7 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
 #[test]
 fn the_loops_and_the_replay_move_everything_alike() {
     let scene = scene();
-    let mut session = VirtualSession::new(&scene, rigid_hand(&scene));
+    let mut session = session_of(&scene, rigid_hand(&scene));
     let replay = Replay::new(
         Arc::new(scene.world.clone()),
         scene.settings,
@@ -259,7 +232,7 @@ fn the_loops_and_the_replay_move_everything_alike() {
 #[test]
 fn the_energy_of_a_hand_that_is_pushed_is_the_obstacles_and_not_the_couplings() {
     let scene = scene();
-    let mut session = VirtualSession::new(&scene, yielding_hand(&scene));
+    let mut session = session_of(&scene, yielding_hand(&scene));
     let mut most_work: f64 = 0.0;
     for _ in 0..8000 {
         session.tick(1);
@@ -328,7 +301,7 @@ fn a_body_that_is_squeezed_holds_the_plate_up_and_clients_are_told_where_it_is()
         god_object::nalgebra::Vector3::y() * std::f64::consts::FRAC_PI_2,
     );
     let checker = checker(&built.world);
-    let mut session = VirtualSession::new(&built, rigid_hand(&built));
+    let mut session = session_of(&built, rigid_hand(&built));
     let mut lags: f64 = 0.0;
     let first = session.now + TICK;
     for _ in 0..2300 {

@@ -3,22 +3,15 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::{BridgeArgs, BridgeReport};
 use taut_link::create_key_file;
+use taut_test_kit::relay::{Impairment, Treatment, Waiting};
 
-use crate::relay::{Impairment, Waiting};
 use crate::support::{PATIENCE, shipped_workbench};
 use crate::wrench_in::{felt, sender};
-
-#[derive(Parser)]
-struct Cli {
-    #[command(flatten)]
-    args: BridgeArgs,
-}
 
 /// What the hand of a bridge felt along x, N, tick by tick, of a source of 1 N that is killed once it was felt for a second; source and bridge are `delay_us`
 /// away from the server, each.
@@ -43,15 +36,18 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
         ..Overrides::default()
     };
     let mut setup = session_setup(&workbench, key, &overrides).expect("a session");
-    let waiting = Waiting::new();
-    setup.link.announced_udp_port = Some(waiting.port());
+    let waiting = Waiting::bind().expect("a port");
+    setup.link.announced_udp_port = Some(waiting.address().port());
     let session = Session::start(setup).unwrap_or_else(|error| panic!("{error}"));
     let (quic, udp) = (session.quic_address(), session.udp_address());
     let impairment = Impairment {
-        delay_us,
+        delay: Duration::from_micros(delay_us),
         ..Impairment::default()
     };
-    let _relay = waiting.start(udp.expect("listens"), impairment, 7);
+    let treatments = vec![Treatment::both_ways(impairment)];
+    let _relay = waiting
+        .start(udp.expect("listens"), treatments, 7)
+        .expect("a relay");
     let server = quic.expect("listens").to_string();
     let word = |path: &Path| path.display().to_string();
     let (key, path) = (word(&key_path), word(&path));
@@ -74,7 +70,7 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
         "--give-up",
         "20",
     ];
-    let args = Cli::try_parse_from(words).expect("valid").args;
+    let args = BridgeArgs::of_words(words).expect("valid");
     let bridge = std::thread::Builder::new()
         .spawn(move || taut_bridge::run(&args))
         .expect("a thread");

@@ -5,7 +5,6 @@ use taut_bridge::{MinJerkPath, ViaPoint};
 use taut_scene::BuiltScene;
 
 /// What the scene's hand intends, as a path in time.
-#[must_use]
 pub fn intention(scene: &BuiltScene) -> MinJerkPath {
     let hand = scene.hand.as_ref().expect("the scene has a hand");
     let points = hand.path.samples().iter().map(|s| ViaPoint {

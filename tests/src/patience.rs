@@ -6,9 +6,6 @@ use std::time::{Duration, Instant};
 const LOOK_PERIOD: Duration = Duration::from_millis(10);
 
 /// Looks until `found` has something, at most `limit`.
-///
-/// # Panics
-/// When the time is over; the message says what was waited for.
 pub fn wait_for<T>(what: &str, limit: Duration, mut found: impl FnMut() -> Option<T>) -> T {
     let deadline = Instant::now() + limit;
     loop {

@@ -25,20 +25,12 @@ pub struct Ended {
 
 impl Ended {
     /// Standard output as JSON.
-    ///
-    /// # Panics
-    /// When it is none.
-    #[must_use]
     pub fn json(&self) -> serde_json::Value {
         serde_json::from_str(&self.stdout)
             .unwrap_or_else(|error| panic!("no JSON ({error}): {}", self.stdout))
     }
 
     /// The one line on standard error.
-    ///
-    /// # Panics
-    /// When there is none, or more.
-    #[must_use]
     pub fn one_sentence(&self) -> &str {
         let lines: Vec<&str> = self.stderr.lines().collect();
         assert_eq!(lines.len(), 1, "not one line on standard error: {lines:#?}");
@@ -58,9 +50,6 @@ pub struct Process {
 
 impl Process {
     /// Starts `program` with `arguments`; its output goes to `NAME.out` and `NAME.err` in `directory`.
-    ///
-    /// # Panics
-    /// When the system does not start it.
     pub fn start<I>(name: &str, program: impl AsRef<Path>, arguments: I, directory: &Path) -> Self
     where
         I: IntoIterator,
@@ -70,9 +59,6 @@ impl Process {
     }
 
     /// The same with a filter of its log on standard error, such as `taut=info`.
-    ///
-    /// # Panics
-    /// When the system does not start it.
     pub fn start_logging<I>(
         name: &str,
         program: impl AsRef<Path>,
@@ -124,13 +110,11 @@ impl Process {
     }
 
     /// What it wrote to standard error so far.
-    #[must_use]
     pub fn stderr(&self) -> String {
         read(&self.stderr)
     }
 
     /// Its number.
-    #[must_use]
     pub fn id(&self) -> u32 {
         self.child.id()
     }
@@ -144,9 +128,6 @@ impl Process {
     }
 
     /// The first line of standard error with this beginning, once it is there: what follows the beginning.
-    ///
-    /// # Panics
-    /// When it does not come in time, or the process ends before.
     pub fn line_after(&mut self, beginning: &str, limit: Duration) -> String {
         let what = format!("a line \"{beginning} ..\" of {}", self.name);
         wait_for(&what, limit, || {
@@ -195,9 +176,6 @@ impl Process {
     }
 
     /// Waits for its end, at most `limit`, and for that of every process that it started.
-    ///
-    /// # Panics
-    /// When it does not end in time, or leaves a process behind.
     pub fn end(mut self, limit: Duration) -> Ended {
         let status = wait_for(&format!("the end of {}", self.name), limit, || {
             self.is_running();
@@ -212,10 +190,6 @@ impl Process {
     }
 
     /// Asks it to end as a terminal does, and gives its report.
-    ///
-    /// # Panics
-    /// When it ends with a failure, or not within [`END_LIMIT`].
-    #[must_use]
     pub fn leave(self) -> String {
         self.interrupt();
         let ended = self.end(END_LIMIT);

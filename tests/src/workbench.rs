@@ -35,10 +35,6 @@ pub struct TestWorkbench {
 impl TestWorkbench {
     /// The shipped workbench on free ports of loopback, without monitor, patient with silent nodes. `program` is the program under test. Waits
     /// until no other test runs a workbench.
-    ///
-    /// # Panics
-    /// When the directory or the key cannot be made.
-    #[must_use]
     pub fn new(program: &str) -> Self {
         let turn = Turn::wait();
         let directory = tempfile::Builder::new()
@@ -72,9 +68,6 @@ impl TestWorkbench {
     }
 
     /// Changes a value of the workbench file, such as `network.quic_port`.
-    ///
-    /// # Panics
-    /// When the table is not there.
     pub fn set(&mut self, key: &str, value: impl Into<Value>) {
         match key.split_once('.') {
             Some((table, key)) => {
@@ -95,15 +88,11 @@ impl TestWorkbench {
     }
 
     /// Where its files are.
-    #[must_use]
     pub fn directory(&self) -> &Path {
         self.directory.path()
     }
 
     /// Writes a file into the directory; its path.
-    ///
-    /// # Panics
-    /// When it cannot be written.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.directory().join(name);
         std::fs::write(&path, content)
@@ -112,16 +101,11 @@ impl TestWorkbench {
     }
 
     /// The cluster key's file.
-    #[must_use]
     pub fn key_path(&self) -> String {
         self.directory().join("cluster.key").display().to_string()
     }
 
     /// The cluster key.
-    ///
-    /// # Panics
-    /// When it cannot be read.
-    #[must_use]
     pub fn key(&self) -> ClusterKey {
         read_key_file(self.key_path().as_ref()).unwrap_or_else(|error| panic!("{error}"))
     }
@@ -134,9 +118,6 @@ impl TestWorkbench {
 
     /// A server whose device is behind a bridge, and that bridge, started with `more` arguments: in its hand the body of a shipped scene goes the
     /// scene's own way, firmly, again and again.
-    ///
-    /// # Panics
-    /// When the scene has no hand.
     pub fn serve_with_bridge(&mut self, scene: &str, more: &[&str]) -> (Server, Process) {
         self.set("scene", scene);
         self.set(
@@ -201,9 +182,6 @@ impl TestWorkbench {
     }
 
     /// What this machine draws with is there; else why not, in the program's own words.
-    ///
-    /// # Errors
-    /// The sentence of `taut render`, which looks for an adapter before anything else.
     pub fn adapter(&self) -> Result<(), String> {
         let nowhere = [
             "render",
@@ -237,9 +215,6 @@ pub struct Server {
 
 impl Server {
     /// Asks it to end and reads its report.
-    ///
-    /// # Panics
-    /// When it does not end well.
     pub fn stop(self) -> serde_json::Value {
         self.process.interrupt();
         let ended = self.process.end(END_LIMIT);

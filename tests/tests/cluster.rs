@@ -1,7 +1,6 @@
 //! A workbench in pieces on loopback: server, bridge, render node and recorder as processes, two more clients in this one.
 
 use std::collections::HashMap;
-use std::net::UdpSocket;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -12,7 +11,6 @@ use taut_link::{
 };
 use taut_proto::PoseF32;
 use taut_proto::control::RefusalCode;
-use taut_proto::state::RunState;
 use taut_scene::Scene;
 use taut_tests::patience::wait_for;
 use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
@@ -320,60 +318,6 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
         assert_eq!(front["state_hash_mismatches"], 0);
     }
     assert_eq!(report["observers"], 1);
-}
-
-#[test]
-fn garbage_is_counted_and_harmless() {
-    let mut workbench = TestWorkbench::new(PROGRAM);
-    workbench.set("scene", SCENE);
-    let server = workbench.serve(&[]);
-    let runtime = Runtime::new().expect("a runtime");
-    let client = Client::join(
-        &runtime,
-        Client::options(&workbench, &server, "client", Transport::Udp),
-    );
-
-    client.goes_on(0);
-    const DATAGRAMS: u32 = 600;
-    /// As many as a socket's buffer holds for sure; then the server is given time to take them.
-    const AT_A_TIME: u32 = 60;
-    let begun = Instant::now();
-    let socket = UdpSocket::bind("127.0.0.1:0").expect("a socket");
-    let mut state = 7_u32;
-    for number in 0..DATAGRAMS {
-        let mut bytes: Vec<u8> = (0..number % 300)
-            .map(|_| {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                (state >> 24) as u8
-            })
-            .collect();
-        if number % 3 == 0 && bytes.len() >= 24 {
-            // A header of taut in front: with its version, and with another one.
-            bytes[..2].copy_from_slice(&taut_proto::version::MAGIC.to_le_bytes());
-            bytes[2] = taut_proto::PROTOCOL_VERSION.wrapping_add((number % 2) as u8);
-        }
-        let to = if number % 10 == 9 {
-            &server.quic
-        } else {
-            &server.udp
-        };
-        let _ = socket.send_to(&bytes, to); // a full buffer loses some, as the network does
-        if number % AT_A_TIME == 0 {
-            client.goes_on(client.link.counters().states);
-        }
-    }
-    client.goes_on(client.link.counters().states);
-    let states = client.leave();
-    let silence = longest_silence(&states, begun);
-    assert!(silence < UNDISTURBED, "nothing for {silence:?}");
-    let faulty = |received: &&ReceivedState| received.state.run == RunState::Fault;
-    assert_eq!(states.iter().filter(faulty).count(), 0);
-    let report = server.stop();
-    let refused = report["packets_refused"].as_u64().expect("a number");
-    assert!(
-        refused >= u64::from(DATAGRAMS) / 2,
-        "only {refused} of {DATAGRAMS} counted"
-    );
 }
 
 #[test]

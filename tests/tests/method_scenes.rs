@@ -237,29 +237,3 @@ fn a_sphere_on_a_plane_feels_the_closed_form_force_and_never_loses_it() {
         }
     }
 }
-
-#[test]
-fn the_same_path_gives_the_same_bits() {
-    let scene = shipped("peg-in-a-hole");
-    let path = intention(&scene);
-    let run = || -> Vec<_> {
-        lead(&scene, sampled(&path, 200.0, 0.0, 30.0))
-            .map(|sample| bits(&sample))
-            .collect()
-    };
-    assert_eq!(run(), run());
-}
-
-fn bits(sample: &Sample) -> Vec<u64> {
-    let pose = &sample.god_object;
-    let numbers = pose
-        .translation
-        .vector
-        .iter()
-        .chain(pose.rotation.coords.iter())
-        .chain(sample.wrench.iter());
-    numbers
-        .chain(std::iter::once(&sample.gap_min))
-        .map(|number| number.to_bits())
-        .collect()
-}

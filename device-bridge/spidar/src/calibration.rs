@@ -39,13 +39,4 @@ impl Encoders {
             self.offsets[i] + self.metres_per_count[i] * (f64::from(counts[i]) + 0.5)
         })
     }
-
-    /// Encoders whose lengths are longer by `corrections`, m, as from [`crate::self_calibrate`].
-    #[must_use]
-    pub fn corrected(&self, corrections: &PerString) -> Self {
-        Self {
-            metres_per_count: self.metres_per_count,
-            offsets: std::array::from_fn(|i| self.offsets[i] + corrections[i]),
-        }
-    }
 }

@@ -1,13 +1,12 @@
-//! Pose from lengths: convergence, singular grips, twist, and calibration from many poses.
+//! Pose from lengths: convergence, singular grips, twist.
 
 use std::time::Duration;
 
 use crate::support::{Random, all, apart, motion, reach, shipped};
-use nalgebra::{Point3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Point3, Vector6};
 use proptest::prelude::*;
 use taut_spidar::{
-    DISAGREEMENT, Encoders, ForwardKinematics, Geometry, LengthRates, PerString, Pose,
-    SelfCalibrationError, StringFault, self_calibrate,
+    DISAGREEMENT, Encoders, ForwardKinematics, Geometry, LengthRates, PerString, Pose, StringFault,
 };
 
 proptest! {
@@ -170,79 +169,4 @@ fn counted(geometry: &Geometry, encoders: &Encoders, pose: &Pose) -> PerString {
         ((lengths[i] - zero[i]) / metres + 0.5).floor() as i32
     });
     encoders.lengths(&counts)
-}
-
-#[test]
-fn many_poses_reveal_errors_of_length_to_the_stated_deviation() {
-    for geometry in all() {
-        // The grip was 2 mm and 2 degrees off the centre when it was calibrated, and two strings slipped since.
-        let placed = Pose::from_parts(
-            Vector3::new(1.5e-3, -1e-3, 0.8e-3).into(),
-            UnitQuaternion::from_scaled_axis(Vector3::new(0.02, -0.02, 0.02)),
-        );
-        let (true_lengths, believed) = (
-            geometry.lengths(&placed),
-            geometry.lengths(&Pose::identity()),
-        );
-        let mut errors: PerString = std::array::from_fn(|i| believed[i] - true_lengths[i]);
-        errors[2] += 1e-3;
-        errors[7] -= 0.7e-3;
-        let exact = Encoders::calibrated(&geometry, &Pose::identity(), &[0; 8]);
-        let measured: Vec<PerString> = (0..300)
-            .map(|k| {
-                let pose = motion(f64::from(k) * 0.0613, reach(&geometry), 0.6);
-                let lengths = counted(&geometry, &exact, &pose);
-                std::array::from_fn(|i| lengths[i] + errors[i])
-            })
-            .collect();
-        let found = self_calibrate(&geometry, &measured);
-        let Ok(found) = found else {
-            panic!("{}: {found:?}", geometry.name);
-        };
-        let mut worst = 0.0_f64;
-        for (i, error) in errors.iter().enumerate() {
-            let off = (found.corrections[i] + error).abs();
-            worst = worst.max(off);
-            assert!(
-                off < 5.0 * found.deviations[i],
-                "{} string {i}: {off}",
-                geometry.name
-            );
-        }
-        let count = geometry.metres_per_count[0].abs();
-        println!(
-            "{}: disagreement {:.3} mm to {:.4} mm; offsets off by at most {:.1} um (stated {:.1} um); pose {:.1} um, {:.1} mdeg",
-            geometry.name,
-            found.disagreement_before * 1e3,
-            found.disagreement_after * 1e3,
-            worst * 1e6,
-            found.deviations.iter().copied().fold(0.0, f64::max) * 1e6,
-            found.position_deviation * 1e6,
-            found.rotation_deviation.to_degrees() * 1e3,
-        );
-        assert!(worst < count, "{}: {worst}", geometry.name);
-        assert!(found.disagreement_before > 0.2e-3 && found.disagreement_after < count);
-        // With the corrections the pose is right again, to a count.
-        let pose = motion(0.777, reach(&geometry), 0.5);
-        let lengths = counted(&geometry, &exact, &pose);
-        let corrected = std::array::from_fn(|i| lengths[i] + errors[i] + found.corrections[i]);
-        let Ok(answer) = ForwardKinematics::new(&geometry).solve(&corrected) else {
-            panic!("{}: a pose of the workspace", geometry.name);
-        };
-        assert!(apart(&answer.frame_from_grip, &pose).0 < 2.0 * count);
-    }
-}
-
-#[test]
-fn poses_that_are_too_few_or_too_alike_calibrate_nothing() {
-    let geometry = shipped("g6x3r");
-    let lengths = geometry.lengths(&Pose::identity());
-    assert_eq!(
-        self_calibrate(&geometry, &[lengths; 5]).err(),
-        Some(SelfCalibrationError::TooFewPoses(5))
-    );
-    assert_eq!(
-        self_calibrate(&geometry, &[lengths; 50]).err(),
-        Some(SelfCalibrationError::TooAlike)
-    );
 }

@@ -31,7 +31,7 @@ pub use plugin::PluginSettings;
 pub use polhem::PolhemSettings;
 pub(crate) use polhem::polhem_grip;
 pub use rate_control::{CapMode, CapSettings, RateControl};
-pub use recorded::{AtEnd, RecordedDevice, Trace, TraceError, TraceRow};
+pub use recorded::{AtEnd, RecordedDevice, Trace, TraceError};
 pub use remote::{DEFAULT_MAX_AGE, MAX_EDGE_DELAY, RemoteDevice};
 pub use simulated::SimulatedDevice;
 pub use space_mouse::{

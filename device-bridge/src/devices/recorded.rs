@@ -9,20 +9,10 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector6};
 
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 use taut_plant::{is_finite, stack};
-
-/// One row of a trace.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TraceRow {
-    /// Seconds since the trace began; strictly increasing.
-    pub time_s: f64,
-    /// World from body, in the body's own frame.
-    pub pose: Pose,
-    /// One bit per button.
-    pub buttons: u16,
-}
+use taut_recording::TraceSample;
 
 /// A recorded device trace, in order of time.
-pub type Trace = Vec<TraceRow>;
+pub type Trace = Vec<TraceSample>;
 
 /// What a recorded device does after the last row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,10 +70,10 @@ impl RecordedDevice {
             return Err(TraceError::Empty);
         }
         for (row, entry) in trace.iter().enumerate() {
-            if !(entry.time_s.is_finite() && is_finite(&entry.pose)) {
+            if !(entry.time.is_finite() && is_finite(&entry.pose)) {
                 return Err(TraceError::NotFinite { row });
             }
-            if row > 0 && entry.time_s <= trace[row - 1].time_s {
+            if row > 0 && entry.time <= trace[row - 1].time {
                 return Err(TraceError::TimeNotIncreasing { row });
             }
         }
@@ -105,14 +95,14 @@ impl RecordedDevice {
 
     /// Pose, velocity of G and buttons at `time_s` on the trace's own clock.
     fn at(&self, time_s: f64) -> (Pose, Vector6<f64>, u16) {
-        let next = self.trace.partition_point(|row| row.time_s <= time_s);
+        let next = self.trace.partition_point(|row| row.time <= time_s);
         let from = &self.trace[next.saturating_sub(1)];
         let Some(to) = self.trace.get(next).filter(|_| next > 0) else {
             return (from.pose, Vector6::zeros(), from.buttons);
         };
 
-        let duration = to.time_s - from.time_s;
-        let fraction = (time_s - from.time_s) / duration;
+        let duration = to.time - from.time;
+        let fraction = (time_s - from.time) / duration;
         let travel = to.pose.translation.vector - from.pose.translation.vector;
         let turn = (to.pose.rotation * from.pose.rotation.inverse()).scaled_axis();
         let rotation = UnitQuaternion::from_scaled_axis(turn * fraction) * from.pose.rotation;
@@ -134,7 +124,7 @@ impl Device for RecordedDevice {
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
         let epoch = *self.epoch.get_or_insert(now);
         let (first, last) = (&self.trace[0], &self.trace[self.trace.len() - 1]);
-        let period = last.time_s - first.time_s;
+        let period = last.time - first.time;
         let mut passed = now.saturating_sub(epoch).as_secs_f64();
         if passed > period {
             match self.at_end {
@@ -143,7 +133,7 @@ impl Device for RecordedDevice {
                 AtEnd::Hold | AtEnd::Loop => passed = period,
             }
         }
-        let (pose, velocity, buttons) = self.at(first.time_s + passed);
+        let (pose, velocity, buttons) = self.at(first.time + passed);
         Ok(DeviceSample {
             time: now,
             pose,
@@ -160,10 +150,10 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    fn row(time_s: f64, x: f64, angle: f64, buttons: u16) -> TraceRow {
+    fn row(time: f64, x: f64, angle: f64, buttons: u16) -> TraceSample {
         let pose = Pose::new(Vector3::x() * x, Vector3::z() * angle);
-        TraceRow {
-            time_s,
+        TraceSample {
+            time,
             pose,
             buttons,
         }

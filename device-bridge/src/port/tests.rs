@@ -202,9 +202,7 @@ fn nobody_arms_a_device_that_is_not_in_order() {
     let mut stage = Stage::new(manual());
     stage.port.ask_to_arm();
     let _ = stage.tick(Err(DeviceFault::NotStarted), None);
-    for _ in 0..500 {
-        let _ = stage.good(force(10.0));
-    }
+    stage.good_for(ms(500), force(10.0));
     assert_eq!(
         stage.kinds(),
         [
@@ -219,14 +217,8 @@ fn nobody_arms_a_device_that_is_not_in_order() {
 #[test]
 fn silence_is_held_for_20_ms_then_gone_before_120_ms_and_ramps_in_again_by_itself() {
     // Also where a person has to arm after a fault: silence is none.
-    let mut stage = Stage::new(manual());
-    let _ = stage.good(force(10.0));
-    stage.port.ask_to_arm();
-    for _ in 0..700 {
-        let _ = stage.good(force(10.0));
-    }
+    let mut stage = Stage::armed_by_a_person();
     let last = stage.now;
-    stage.events.clear();
     let mut before = 10.0;
     for age in 1..=300 {
         let now = stage.now + TICK;
@@ -246,9 +238,7 @@ fn silence_is_held_for_20_ms_then_gone_before_120_ms_and_ramps_in_again_by_itsel
         before = felt;
     }
     assert_eq!(stage.kinds(), [EventKind::ForceStale]);
-    for _ in 0..600 {
-        let _ = stage.good(force(10.0));
-    }
+    stage.good_for(ms(600), force(10.0));
     assert_eq!(
         stage.kinds(),
         [EventKind::ForceStale, EventKind::Arming, EventKind::Armed]
@@ -257,19 +247,11 @@ fn silence_is_held_for_20_ms_then_gone_before_120_ms_and_ramps_in_again_by_itsel
 
 #[test]
 fn a_fault_waits_for_a_person_where_that_is_wanted() {
-    let mut stage = Stage::new(manual());
-    let _ = stage.good(force(10.0));
-    stage.port.ask_to_arm();
-    for _ in 0..700 {
-        let _ = stage.good(force(10.0));
-    }
-    stage.events.clear();
+    let mut stage = Stage::armed_by_a_person();
     let mut jump = sample(stage.now + TICK);
     jump.pose.translation.vector.x += 0.2;
     let _ = stage.tick(Ok(jump), Some(Command::fresh(stage.now, force(10.0))));
-    for _ in 0..1000 {
-        let _ = stage.good(force(10.0));
-    }
+    stage.good_for(ms(1000), force(10.0));
     assert_eq!(stage.port.state(), ArmingState::Faulted);
     assert_eq!(
         stage.kinds(),
@@ -322,15 +304,11 @@ fn the_dead_mans_button_is_the_force() {
 fn who_disarms_is_asked_before_there_is_force_again() {
     let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
     stage.port.ask_to_disarm();
-    for _ in 0..1000 {
-        let _ = stage.good(force(10.0));
-    }
+    stage.good_for(ms(1000), force(10.0));
     assert_eq!(stage.port.rendered(), &Vector6::zeros());
     assert_eq!(stage.kinds(), [EventKind::Disarmed]);
     stage.port.ask_to_arm();
-    for _ in 0..600 {
-        let _ = stage.good(force(10.0));
-    }
+    stage.good_for(ms(600), force(10.0));
     assert_eq!(stage.port.rendered(), &force(10.0));
 }
 

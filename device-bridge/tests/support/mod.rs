@@ -13,7 +13,6 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use nalgebra::Vector6;
 use taut_bridge::{BridgeArgs, DEFAULT_MAX_AGE, Device, DeviceLimits, RemoteDevice};
 use taut_link::proto::mesh_blob::Positions;
@@ -27,12 +26,6 @@ pub const STIFFNESS: f64 = 500.0;
 
 /// Only a hang takes this long.
 pub const PATIENCE: Duration = Duration::from_secs(60);
-
-#[derive(Parser)]
-struct Cli {
-    #[command(flatten)]
-    args: BridgeArgs,
-}
 
 fn content() -> Content {
     let corners = vec![
@@ -139,9 +132,7 @@ impl Workbench {
             "--priority",
             "0",
         ];
-        Cli::try_parse_from(fixed.iter().chain(more))
-            .expect("valid")
-            .args
+        BridgeArgs::of_words(fixed.iter().chain(more)).expect("valid")
     }
 
     pub fn file(&self, name: &str, text: &str) -> PathBuf {

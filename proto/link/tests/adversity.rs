@@ -1,21 +1,10 @@
 //! What the network and other programs do to a session: garbage, replay, damage, loss, sudden death.
 
-use crate::support::{relay::Impairment, *};
+use crate::support::*;
 use std::{net::UdpSocket, time::Duration};
-use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
+use taut_link::{LinkEvent, Role, ServerOptions};
 use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
-
-/// Sends states until `client` has `count` of them.
-async fn take_states(server: &ServerLink, client: &ClientLink, first: u64, count: usize) -> u64 {
-    let mut states = Vec::new();
-    let next = broadcast_until(&mut server.broadcaster(), first, || {
-        client.drain_states(&mut states);
-        states.len() >= count
-    })
-    .await;
-    assert_in_order(&states);
-    next
-}
+use taut_test_kit::relay::{Direction, Impairment};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn garbage_is_counted_and_has_no_effect() {
@@ -23,7 +12,7 @@ async fn garbage_is_counted_and_has_no_effect() {
     let client = client(&server, Role::Render, "left").await;
     let tick = take_states(&server, &client, 1, 20).await;
 
-    let socket = UdpSocket::bind("127.0.0.1:0").unwrap_or_else(|error| panic!("{error}"));
+    let socket = must(UdpSocket::bind("127.0.0.1:0"));
     let throw = |bytes: &[u8]| assert!(socket.send_to(bytes, server.udp_addr()).is_ok());
     let header = |version: u8, sender: u8| {
         let mut bytes = vec![0; 24 + 16];
@@ -59,7 +48,7 @@ async fn garbage_is_counted_and_has_no_effect() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
-    let (server, relay) = behind_relay(Impairment::default(), 1, |options| options).await;
+    let (server, relay) = behind_relay(Impairment::default(), 1).await;
     let mut inputs = server
         .device_inputs()
         .expect("the first taker gets the inputs");
@@ -82,7 +71,7 @@ async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
     let path = server.clients()[0].udp_address;
     let newest = *inputs.read();
     let before = server.counters();
-    let thief = UdpSocket::bind("127.0.0.1:0").unwrap_or_else(|error| panic!("{error}"));
+    let thief = must(UdpSocket::bind("127.0.0.1:0"));
     for datagram in &stolen {
         assert!(thief.send_to(datagram, server.udp_addr()).is_ok());
     }
@@ -99,21 +88,20 @@ async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_bad_network_costs_states_but_never_order_or_truth() {
     let impairment = Impairment {
-        lost: 50,
-        bursts: 0,
-        doubled: 50,
-        swapped: 50,
-        damaged: 50,
-        delay_us: 0,
+        lost: 0.05,
+        doubled: 0.05,
+        swapped: 0.05,
+        flipped: 0.05,
+        ..Impairment::default()
     };
-    let (server, relay) = behind_relay(impairment, 2, |options| options).await;
+    let (server, relay) = behind_relay(impairment, 2).await;
     let client = client(&server, Role::Render, "left").await;
     wait_until("path", || server.clients()[0].udp_address.is_some()).await;
     let mut states = Vec::new();
     broadcast_in_step_until(
         &mut server.broadcaster(),
         1,
-        || client.counters().states + relay.lost_down(),
+        || client.counters().states + lost_down(&relay),
         || {
             client.drain_states(&mut states);
             states.len() >= 600
@@ -122,14 +110,14 @@ async fn a_bad_network_costs_states_but_never_order_or_truth() {
     .await;
     assert_in_order(&states); // and equality with what was sent
     let counters = client.counters();
-    assert!(relay.lost_down() > 0 && relay.doubled_down() > 0);
+    let (lost, doubled) = (lost_down(&relay), relay.counts(Direction::Down).doubled);
+    assert!(lost > 0 && doubled > 0);
     assert!(
-        counters.lost > 0 && counters.lost <= relay.lost_down() + 1,
-        "{counters:?}, relay lost {}",
-        relay.lost_down()
+        counters.lost > 0 && counters.lost <= lost + 1,
+        "{counters:?}, relay lost {lost}"
     );
     assert!(
-        counters.duplicates > 0 && counters.duplicates <= relay.doubled_down() + 1,
+        counters.duplicates > 0 && counters.duplicates <= doubled + 1,
         "{counters:?}"
     );
     assert!(counters.late > 0, "{counters:?}");
@@ -144,19 +132,18 @@ fn murdered_client(options: taut_link::ClientOptions, life: Duration) {
     let died = std::thread::Builder::new()
         .name("victim".to_owned())
         .spawn(move || {
-            let runtime = tokio::runtime::Builder::new_multi_thread()
-                .worker_threads(1)
-                .enable_all()
-                .build()
-                .unwrap_or_else(|error| panic!("{error}"));
-            let link = runtime
-                .block_on(taut_link::connect(options))
-                .unwrap_or_else(|error| panic!("{error}"));
+            let runtime = must(
+                tokio::runtime::Builder::new_multi_thread()
+                    .worker_threads(1)
+                    .enable_all()
+                    .build(),
+            );
+            let link = must(runtime.block_on(taut_link::connect(options)));
             std::thread::sleep(life);
             runtime.shutdown_background();
             drop(link);
         });
-    let died = died.unwrap_or_else(|error| panic!("{error}"));
+    let died = must(died);
     assert!(died.join().is_ok());
 }
 
@@ -216,20 +203,19 @@ async fn a_restarted_node_takes_the_place_of_its_silent_self() {
     let first = options.clone();
     tokio::task::block_in_place(|| murdered_client(first, Duration::from_millis(200)));
     tokio::time::sleep(Duration::from_millis(600)).await; // silent for longer than the server forgives
-    let again = taut_link::connect(options)
-        .await
-        .unwrap_or_else(|error| panic!("{error}"));
+    let again = must(taut_link::connect(options).await);
     assert_eq!(server.clients().len(), 1);
     take_states(&server, &again, 1, 20).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_dead_server_is_noticed() {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .unwrap_or_else(|error| panic!("{error}"));
+    let runtime = must(
+        tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build(),
+    );
     let (to_us, from_it) = tokio::sync::oneshot::channel();
     let host = runtime.spawn(async move {
         let server = server().await;
@@ -239,9 +225,7 @@ async fn a_dead_server_is_noticed() {
         drop(server);
     });
     let options = from_it.await.expect("no server");
-    let client = taut_link::connect(options)
-        .await
-        .unwrap_or_else(|error| panic!("{error}"));
+    let client = must(taut_link::connect(options).await);
     // Its endpoint dies with its runtime and says nothing.
     runtime.shutdown_background();
     drop(host);

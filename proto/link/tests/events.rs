@@ -1,9 +1,10 @@
 //! Discrete events over sockets: each reaches each client once, in order, whatever the hot plane loses.
 
-use crate::support::{relay::Impairment, *};
+use crate::support::*;
 use std::time::{Duration, Instant};
 use taut_link::{Broadcaster, ClientLink, ClientOptions, Role, Transport};
 use taut_proto::{HotState, state::EventRecord};
+use taut_test_kit::relay::{Burst, Impairment};
 
 fn record(id: u32) -> EventRecord {
     EventRecord {
@@ -38,20 +39,24 @@ async fn enter(broadcaster: &mut Broadcaster, tick: u64, client: &ClientLink) ->
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn no_event_is_lost_and_none_comes_twice_over_a_bad_network() {
     let impairment = Impairment {
-        lost: 100,
-        bursts: 5,
-        doubled: 100,
-        swapped: 100,
-        damaged: 20,
-        delay_us: 500,
+        lost: 0.1,
+        bursts: Some(Burst {
+            chance: 0.005,
+            length: 21,
+        }),
+        doubled: 0.1,
+        swapped: 0.1,
+        flipped: 0.02,
+        delay: Duration::from_micros(500),
+        ..Impairment::default()
     };
-    let (server, relay) = behind_relay(impairment, 3, |options| options).await;
+    let (server, relay) = behind_relay(impairment, 3).await;
     let client = client(&server, Role::Render, "left").await;
     let mut broadcaster = server.broadcaster();
     let mut tick = enter(&mut broadcaster, 1, &client).await;
     let (mut taken, mut next) = (Vec::new(), 1);
     // Until the network was bad enough: how much it loses in 400 states is up to the rhythm of this machine.
-    while next <= 400 || (relay.lost_down() <= 50 && next <= 4000) {
+    while next <= 400 || (lost_down(&relay) <= 50 && next <= 4000) {
         let count = u32::try_from(tick % 3).unwrap_or(0); // 0, 1 or 2 at a time
         broadcaster.send(&with_events(tick, next..next + count));
         next += count;
@@ -68,17 +73,13 @@ async fn no_event_is_lost_and_none_comes_twice_over_a_bad_network() {
     take(&client, &mut taken);
     assert_eq!(taken, (1..next).collect::<Vec<_>>());
     assert_eq!(client.events_lost(), (0, 0));
-    assert!(relay.lost_down() > 50, "{}", relay.lost_down());
+    assert!(lost_down(&relay) > 50, "{}", lost_down(&relay));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn events_come_without_any_state_after_them() {
-    let impairment = Impairment {
-        lost: 1000,
-        ..Impairment::default()
-    };
     // Nothing of the hot plane arrives at all.
-    let (server, _relay) = behind_relay(impairment, 4, |options| options).await;
+    let (server, _relay) = behind_relay(Impairment::losing(1.0), 4).await;
     let client = client(&server, Role::Render, "left").await;
     server.broadcaster().send(&with_events(1, 1..4));
     let mut taken = Vec::new();
@@ -96,13 +97,14 @@ async fn a_late_client_gets_what_comes_after_it_and_slow_ones_get_all() {
     let first = client(&server, Role::Render, "first").await;
     let tick = enter(&mut broadcaster, 1, &first).await;
     broadcaster.send(&with_events(tick, 1..5));
-    let rare = taut_link::connect(ClientOptions {
-        rate_hz: 1,
-        transport: Transport::QuicDatagram,
-        ..options(&server, Role::Observer, "rare")
-    })
-    .await
-    .unwrap_or_else(|error| panic!("{error}"));
+    let rare = must(
+        taut_link::connect(ClientOptions {
+            rate_hz: 1,
+            transport: Transport::QuicDatagram,
+            ..options(&server, Role::Observer, "rare")
+        })
+        .await,
+    );
     for k in 0..10 {
         broadcaster.send(&with_events(
             tick + 1 + k,

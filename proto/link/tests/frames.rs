@@ -2,10 +2,7 @@
 //!
 //! Nothing here measures: how sharp the swaps are is told by the report of `tests/network`.
 
-use crate::support::{
-    relay::{Impairment, Relay, Waiting},
-    *,
-};
+use crate::support::*;
 use std::{
     collections::HashMap,
     sync::{
@@ -17,6 +14,7 @@ use std::{
 };
 use taut_link::{ClientLink, FrameTurn, Role, ServerLink, ServerOptions};
 use taut_proto::barrier::{MasterSettings, Swap};
+use taut_test_kit::relay::{Impairment, Relay};
 
 /// Fast enough for many frames, slow enough for a busy machine.
 const PERIOD: Duration = Duration::from_millis(33);
@@ -34,10 +32,10 @@ struct Leader {
 
 impl Leader {
     async fn start(swap: Option<Swap>, impairment: Option<Impairment>) -> Leader {
-        let waiting = impairment.map(|_| Waiting::new());
+        let relayed = impairment.map(|impairment| (relay_port(), impairment));
         let server = server_with(ServerOptions {
             idle_timeout: FORGIVING,
-            announced_udp_port: waiting.as_ref().map(Waiting::port),
+            announced_udp_port: relayed.as_ref().map(|(port, _)| port.address().port()),
             frames: swap.map(|swap| MasterSettings {
                 swap,
                 period_ns: PERIOD.as_nanos() as u64,
@@ -46,9 +44,8 @@ impl Leader {
             ..ServerOptions::loopback(key('a'))
         })
         .await;
-        let relay = waiting
-            .zip(impairment)
-            .map(|(waiting, impairment)| waiting.start(server.udp_addr(), impairment, 7));
+        let relay =
+            relayed.map(|(port, impairment)| start_relay(port, server.udp_addr(), impairment, 7));
         let stop = Arc::new(AtomicBool::new(false));
         let mut threads = Vec::new();
         let (mut broadcaster, clock, over) = (server.broadcaster(), server.clock(), stop.clone());
@@ -239,10 +236,10 @@ async fn two_nodes_show_the_same_states_at_a_planned_time() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_bad_network_costs_time_but_never_truth() {
     let impairment = Impairment {
-        lost: 150,
-        doubled: 100,
-        swapped: 100,
-        damaged: 50,
+        lost: 0.15,
+        doubled: 0.1,
+        swapped: 0.1,
+        flipped: 0.05,
         ..Impairment::default()
     };
     let leader = Leader::start(Some(Swap::Immediate), Some(impairment)).await;
@@ -254,12 +251,7 @@ async fn a_bad_network_costs_time_but_never_truth() {
     show_together(&shown, 50).await;
     compare(&leader, 160).await;
     drop((front, table));
-    assert!(
-        leader
-            .relay
-            .as_ref()
-            .is_some_and(|relay| relay.lost_down() > 0)
-    );
+    assert!(leader.relay.as_ref().map_or(0, lost_down) > 0);
     assert_equal_frames(&shown, 50);
     let report = leader.server.frame_report().unwrap_or_default();
     assert_eq!(report.counts.mismatches, 0, "{report:?}");

@@ -69,12 +69,13 @@ async fn the_same_group_stays_while_only_addresses_become_known() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_member_over_quic_has_no_address_and_is_told_all_the_same() {
     let server = server().await;
-    let far = taut_link::connect(ClientOptions {
-        transport: Transport::QuicDatagram,
-        ..options(&server, Role::Observer, "far")
-    })
-    .await
-    .unwrap_or_else(|error| panic!("{error}"));
+    let far = must(
+        taut_link::connect(ClientOptions {
+            transport: Transport::QuicDatagram,
+            ..options(&server, Role::Observer, "far")
+        })
+        .await,
+    );
     wait_until("the roster", || far.roster().is_some()).await;
     let left = client(&server, Role::Render, "left").await;
     wait_until("both", || {
@@ -160,7 +161,7 @@ async fn the_server_takes_nothing_under_a_group_key() {
     let mut inputs = inputs;
     let bridge = client(&server, Role::Device, "bridge").await;
     let epoch = server.epoch();
-    let bad = UdpSocket::bind("127.0.0.1:0").unwrap_or_else(|error| panic!("{error}"));
+    let bad = must(UdpSocket::bind("127.0.0.1:0"));
     let before = server.counters();
 
     // Even in the name of the bridge, and even if its headers were well made.
@@ -174,7 +175,7 @@ async fn the_server_takes_nothing_under_a_group_key() {
     sealer.learn(&group, 0);
     let mut buffer = [0; MAX_DATAGRAM_BYTES];
     let sealed = sealer.seal(&Payload::Heartbeat, 0, &mut buffer);
-    let heartbeat = sealed.unwrap_or_else(|error| panic!("{error}")).to_vec();
+    let heartbeat = must(sealed).to_vec();
     assert!(bad.send_to(&heartbeat, server.udp_addr()).is_ok());
     for kind in [
         Kind::Input,

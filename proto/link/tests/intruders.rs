@@ -20,10 +20,6 @@ use taut_proto::{
 };
 use tokio::sync::mpsc;
 
-fn must<T, E: std::fmt::Display>(result: Result<T, E>) -> T {
-    result.unwrap_or_else(|error| panic!("{error}"))
-}
-
 /// Stands between with a certificate of his own, and passes on what each side says.
 struct Middle {
     address: SocketAddr,

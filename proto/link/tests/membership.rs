@@ -38,9 +38,7 @@ impl Mortal {
             node_timeout: FORGIVING,
             ..ServerOptions::loopback(key('a'))
         };
-        let link = runtime
-            .block_on(serve(options, content))
-            .unwrap_or_else(|error| panic!("{error}"));
+        let link = must(runtime.block_on(serve(options, content)));
         let addresses = (link.quic_addr(), link.udp_addr());
         Mortal {
             runtime,
@@ -99,9 +97,7 @@ fn a_link_whose_server_dies_is_lost_and_comes_back_to_the_next_server_with_a_new
         RejoinPolicy::default(),
         prepare,
     );
-    let (supervised, first, prepared) = clients
-        .block_on(joined)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let (supervised, first, prepared) = must(clients.block_on(joined));
     assert_eq!((prepared, supervised.health()), (0, LinkHealth::Connected));
     clients.block_on(wait_until("the clock", || first.session_now().is_some()));
     let before = first.mesh_counters();
@@ -146,14 +142,10 @@ fn datagrams_of_an_old_epoch_are_refused() {
         idle_timeout: Duration::from_secs(60),
         ..options(&server.link, Role::Device, "bridge")
     };
-    let old = clients
-        .block_on(connect(old))
-        .unwrap_or_else(|error| panic!("{error}"));
+    let old = must(clients.block_on(connect(old)));
     let addresses = server.die();
     let server = Mortal::start(content(), Some(addresses));
-    let new = clients
-        .block_on(connect(options(&server.link, Role::Device, "bridge")))
-        .unwrap_or_else(|error| panic!("{error}"));
+    let new = must(clients.block_on(connect(options(&server.link, Role::Device, "bridge"))));
     assert_eq!(
         old.session(),
         new.session(),
@@ -188,9 +180,7 @@ fn a_server_that_stops_ends_the_link_unless_it_is_to_stay() {
         let joined = SupervisedLink::join(joining(&server.link, "left"), policy, |_| async {
             Ok::<(), LinkError>(())
         });
-        let (supervised, _first, ()) = clients
-            .block_on(joined)
-            .unwrap_or_else(|error| panic!("{error}"));
+        let (supervised, _first, ()) = must(clients.block_on(joined));
         let Mortal {
             runtime,
             link,
@@ -220,9 +210,7 @@ fn a_limit_that_was_named_ends_a_lost_link_and_a_failed_preparation_does_not() {
     let joined = SupervisedLink::join(joining(&server.link, "left"), policy, |_| async {
         Ok::<(), LinkError>(())
     });
-    let (supervised, _first, ()) = clients
-        .block_on(joined)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let (supervised, _first, ()) = must(clients.block_on(joined));
     let dead = Instant::now();
     let addresses = server.die();
     assert!(matches!(
@@ -252,9 +240,7 @@ fn a_limit_that_was_named_ends_a_lost_link_and_a_failed_preparation_does_not() {
         RejoinPolicy::default(),
         prepare,
     );
-    let (supervised, first, _) = clients
-        .block_on(joined)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let (supervised, first, _) = must(clients.block_on(joined));
     first.abandon();
     let Renewal::Session { prepared, .. } = renewal(&supervised) else {
         panic!("a new session");
@@ -265,9 +251,7 @@ fn a_limit_that_was_named_ends_a_lost_link_and_a_failed_preparation_does_not() {
 /// A client that dies without a word: its runtime goes first, so that nothing can be sent any more.
 fn murder(options: ClientOptions) {
     let runtime = runtime();
-    let link = runtime
-        .block_on(connect(options))
-        .unwrap_or_else(|error| panic!("{error}"));
+    let link = must(runtime.block_on(connect(options)));
     runtime.block_on(wait_until("being heard", || link.session_now().is_some()));
     runtime.shutdown_background();
     drop(link);
@@ -318,21 +302,16 @@ async fn a_silent_node_is_told_evicted_and_its_name_is_free_and_who_only_watches
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn meshes_come_from_the_disk_the_second_time_and_a_damaged_one_is_fetched_again() {
     let server = server().await;
-    let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+    let folder = must(tempfile::tempdir());
     let start = || async {
-        let cache = MeshCache::open(folder.path()).unwrap_or_else(|error| panic!("{error}"));
+        let cache = must(MeshCache::open(folder.path()));
         let options = ClientOptions {
             mesh_cache: Some(Arc::new(cache)),
             ..options(&server, Role::Render, "left") // who only watches gets no meshes
         };
-        let link = connect(options)
-            .await
-            .unwrap_or_else(|error| panic!("{error}"));
+        let link = must(connect(options).await);
         for mesh in content().meshes {
-            let got = link
-                .mesh(hash_of(&mesh))
-                .await
-                .unwrap_or_else(|error| panic!("{error}"));
+            let got = must(link.mesh(hash_of(&mesh)).await);
             assert_eq!(*got, mesh);
         }
         let counters = link.mesh_counters();
@@ -354,10 +333,10 @@ async fn meshes_come_from_the_disk_the_second_time_and_a_damaged_one_is_fetched_
     let damaged = folder
         .path()
         .join(format!("{}.tmsh", hash_of(&content().meshes[1])));
-    let mut content = fs::read(&damaged).unwrap_or_else(|error| panic!("{error}"));
+    let mut content = must(fs::read(&damaged));
     let middle = content.len() / 2;
     content[middle] ^= 1;
-    fs::write(&damaged, content).unwrap_or_else(|error| panic!("{error}"));
+    must(fs::write(&damaged, content));
     let third = start().await;
     assert_eq!((third.fetched, third.from_cache, third.damaged), (1, 1, 1));
     let fourth = start().await;
@@ -371,8 +350,7 @@ fn heavy_content(triangles: u32) -> (Content, u64) {
         .map(|i| [f64::from(i) * 1e-6, f64::from(i % 2) * 1e-3, 0.0])
         .collect();
     let faces = (0..triangles).map(|i| [i, i + 1, i + 2]).collect();
-    let mesh = MeshBlob::new(Positions::F64(positions), faces, None)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let mesh = must(MeshBlob::new(Positions::F64(positions), faces, None));
     content.description.obstacles[0].mesh = hash_of(&mesh);
     let bytes = mesh.encode().map_or(0, |bytes| bytes.len() as u64);
     content.meshes.push(mesh);
@@ -388,9 +366,7 @@ async fn a_late_node_gets_a_large_mesh_at_a_pace_that_leaves_the_others_their_st
         node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
     };
-    let server = serve(options, content)
-        .await
-        .unwrap_or_else(|error| panic!("{error}"));
+    let server = must(serve(options, content).await);
     let early = client(&server, Role::Render, "left").await;
     let mut seen = Vec::new();
     let tick = broadcast_until(&mut server.broadcaster(), 1, || {
@@ -402,13 +378,9 @@ async fn a_late_node_gets_a_large_mesh_at_a_pace_that_leaves_the_others_their_st
     let late_options = joining(&server, "late");
     let began = Instant::now();
     let late = tokio::spawn(async move {
-        let late = connect(late_options)
-            .await
-            .unwrap_or_else(|error| panic!("{error}"));
+        let late = must(connect(late_options).await);
         let mesh = late.description().obstacles[0].mesh;
-        late.mesh(mesh)
-            .await
-            .unwrap_or_else(|error| panic!("{error}"));
+        must(late.mesh(mesh).await);
         let took = began.elapsed();
         // What was sent meanwhile has been queued: the newest quarter of a second of it.
         (drain(&late).len(), took)
@@ -424,7 +396,7 @@ async fn a_late_node_gets_a_large_mesh_at_a_pace_that_leaves_the_others_their_st
         },
     )
     .await;
-    let (queued, took) = late.await.unwrap_or_else(|error| panic!("{error}"));
+    let (queued, took) = must(late.await);
     assert_in_order(&seen);
     let gaps = seen.windows(2).map(|two| two[1].received - two[0].received);
     println!(

@@ -14,14 +14,12 @@ use std::{
     thread::JoinHandle,
     time::{Duration, Instant},
 };
-use taut_link::{
-    ClientLink, ClientOptions, MulticastOptions, Role, ServerLink, ServerOptions, Transport,
-};
+use taut_link::{ClientOptions, MulticastOptions, Role, ServerLink, ServerOptions, Transport};
 
 /// A group of this test alone: its port is free on this machine.
 fn options_with_group() -> (MulticastOptions, ServerOptions) {
     let free = UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr());
-    let port = free.unwrap_or_else(|error| panic!("{error}")).port();
+    let port = must(free).port();
     let [high, low] = port.to_be_bytes();
     let multicast = MulticastOptions {
         group: SocketAddrV4::new(Ipv4Addr::new(239, 255, high, low), port),
@@ -75,25 +73,26 @@ impl Switch {
             sender.set_multicast_if_v4(&server.interface)?;
             Ok((listener, sender))
         };
-        let (listener, sender) = listen().unwrap_or_else(|error| panic!("{error}"));
+        let (listener, sender) = must(listen());
         let (open, stop) = (
             Arc::new(AtomicBool::new(open)),
             Arc::new(AtomicBool::new(false)),
         );
         let (is_open, stops) = (open.clone(), stop.clone());
-        let thread = std::thread::Builder::new()
-            .name("switch".to_owned())
-            .spawn(move || {
-                let mut buffer = [0; 2048];
-                while !stops.load(Ordering::SeqCst) {
-                    if let Ok(length) = listener.recv(&mut buffer)
-                        && is_open.load(Ordering::SeqCst)
-                    {
-                        let _ = sender.send_to(&buffer[..length], &clients.into());
+        let thread = must(
+            std::thread::Builder::new()
+                .name("switch".to_owned())
+                .spawn(move || {
+                    let mut buffer = [0; 2048];
+                    while !stops.load(Ordering::SeqCst) {
+                        if let Ok(length) = listener.recv(&mut buffer)
+                            && is_open.load(Ordering::SeqCst)
+                        {
+                            let _ = sender.send_to(&buffer[..length], &clients.into());
+                        }
                     }
-                }
-            })
-            .unwrap_or_else(|error| panic!("{error}"));
+                }),
+        );
         Switch {
             open,
             stop,
@@ -140,18 +139,6 @@ async fn until_path(server: &ServerLink, tick: u64, nodes: &[&str], multicast: b
     .await
 }
 
-/// Sends states until `client` has `count` more; asserts order and truth.
-async fn take(server: &ServerLink, client: &ClientLink, tick: u64, count: usize) -> u64 {
-    let mut states = Vec::new();
-    let next = broadcast_until(&mut server.broadcaster(), tick, || {
-        client.drain_states(&mut states);
-        states.len() >= count
-    })
-    .await;
-    assert_in_order(&states);
-    next
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn one_datagram_serves_all_who_hear_the_group() {
     if !multicast_works() {
@@ -163,18 +150,20 @@ async fn one_datagram_serves_all_who_hear_the_group() {
     let right = client(&server, Role::Observer, "right").await;
     // These do not listen: a device bridge, QUIC, and who wants few states.
     let bridge = client(&server, Role::Device, "bridge").await;
-    let far = taut_link::connect(ClientOptions {
-        transport: Transport::QuicDatagram,
-        ..support::options(&server, Role::Render, "far")
-    })
-    .await
-    .unwrap_or_else(|error| panic!("{error}"));
-    let rare = taut_link::connect(ClientOptions {
-        rate_hz: 100,
-        ..support::options(&server, Role::Observer, "rare")
-    })
-    .await
-    .unwrap_or_else(|error| panic!("{error}"));
+    let far = must(
+        taut_link::connect(ClientOptions {
+            transport: Transport::QuicDatagram,
+            ..support::options(&server, Role::Render, "far")
+        })
+        .await,
+    );
+    let rare = must(
+        taut_link::connect(ClientOptions {
+            rate_hz: 100,
+            ..support::options(&server, Role::Observer, "rare")
+        })
+        .await,
+    );
 
     let mut tick = 1;
     let start = Instant::now();
@@ -185,7 +174,7 @@ async fn one_datagram_serves_all_who_hear_the_group() {
         let multicast_before = server.counters().multicast_sent;
         for client in [&left, &right, &bridge, &far] {
             drain(client);
-            tick = take(&server, client, tick, 100).await;
+            tick = take_states(&server, client, tick, 100).await;
         }
         assert!(server.counters().multicast_sent >= multicast_before + 400);
         // A time response now and then, but no states. A starved machine makes a group silent, or takes long for the few states.
@@ -225,12 +214,12 @@ async fn a_group_that_falls_silent_costs_a_moment_and_is_tried_again() {
     let tick = until_path(&server, tick, &["left"], false).await;
     assert!(left.counters().multicast_lost >= 1);
     drain(&left);
-    let tick = take(&server, &left, tick, 100).await;
+    let tick = take_states(&server, &left, tick, 100).await;
     // It is mended, and taken again by itself.
     switch.open.store(true, Ordering::SeqCst);
     let tick = until_path(&server, tick, &["left"], true).await;
     drain(&left);
-    take(&server, &left, tick, 100).await;
+    take_states(&server, &left, tick, 100).await;
     assert_eq!(left.is_closed(), None);
 }
 
@@ -241,7 +230,7 @@ async fn a_group_that_nobody_hears_harms_nobody() {
     }
     let (server, _switch) = behind_switch(false).await;
     let left = client(&server, Role::Render, "left").await;
-    take(&server, &left, 1, 300).await;
+    take_states(&server, &left, 1, 300).await;
     assert!(!server.clients()[0].by_multicast);
     assert_eq!(left.counters().multicast_heard, 0);
     assert_eq!(left.counters().multicast_lost, 0, "it never relied on it");
@@ -274,7 +263,7 @@ async fn strangers_in_the_group_are_refused() {
     let tick = until_path(&server, 1, &["left"], true).await;
     let before = left.counters();
     let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::DGRAM, None);
-    let stranger = socket.unwrap_or_else(|error| panic!("{error}"));
+    let stranger = must(socket);
     assert!(stranger.set_multicast_if_v4(&multicast.interface).is_ok());
     let mut forged = vec![0x57, 0x48, taut_proto::PROTOCOL_VERSION, 0]; // HOT
     forged.extend(server.epoch().to_le_bytes());
@@ -292,7 +281,7 @@ async fn strangers_in_the_group_are_refused() {
     })
     .await;
     drain(&left);
-    take(&server, &left, tick, 50).await;
+    take_states(&server, &left, tick, 50).await;
 }
 
 /// A client over QUIC that stands still for a while, as a suspended process does, and then goes on.
@@ -309,24 +298,24 @@ async fn a_full_way_lowers_the_rate_and_the_full_rate_comes_back() {
         ..options(&server, Role::Render, "slow")
     };
     let (go_on, stands_still) = std::sync::mpsc::channel::<()>();
-    let thread = std::thread::Builder::new()
-        .name("slow".to_owned())
-        .spawn(move || {
-            let runtime = tokio::runtime::Builder::new_current_thread()
-                .enable_all()
-                .build()
-                .unwrap_or_else(|error| panic!("{error}"));
-            runtime.block_on(async {
-                let link = taut_link::connect(options)
-                    .await
-                    .unwrap_or_else(|error| panic!("{error}"));
-                // Nothing of this runtime moves until the word comes.
-                assert!(stands_still.recv().is_ok());
-                let reason = link.closed().await;
-                assert_eq!(reason, taut_link::STOP_REASON);
-            });
-        })
-        .unwrap_or_else(|error| panic!("{error}"));
+    let thread = must(
+        std::thread::Builder::new()
+            .name("slow".to_owned())
+            .spawn(move || {
+                let runtime = must(
+                    tokio::runtime::Builder::new_current_thread()
+                        .enable_all()
+                        .build(),
+                );
+                runtime.block_on(async {
+                    let link = must(taut_link::connect(options).await);
+                    // Nothing of this runtime moves until the word comes.
+                    assert!(stands_still.recv().is_ok());
+                    let reason = link.closed().await;
+                    assert_eq!(reason, taut_link::STOP_REASON);
+                });
+            }),
+    );
 
     let mut broadcaster = server.broadcaster();
     let lowered = || server.clients().iter().any(|client| client.lowered_rate);

@@ -18,11 +18,12 @@ async fn a_datagram_that_is_sent_on_from_elsewhere_turns_no_stream_there() {
         ..ServerOptions::loopback(key('a'))
     })
     .await;
-    let client = connect(ClientOptions {
-        ..options(&server, Role::Render, "left")
-    })
-    .await
-    .unwrap_or_else(|error| panic!("{error}"));
+    let client = must(
+        connect(ClientOptions {
+            ..options(&server, Role::Render, "left")
+        })
+        .await,
+    );
     let own = UdpSocket::bind("127.0.0.1:0").expect("a port");
     let elsewhere = UdpSocket::bind("127.0.0.2:0").expect("another address of this machine");
     for socket in [&own, &elsewhere] {

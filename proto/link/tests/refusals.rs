@@ -78,7 +78,7 @@ fn hello() -> Vec<u8> {
         proof: [0; 32],
         grant: Grant::Master,
     });
-    hello.to_frame().unwrap_or_else(|error| panic!("{error}"))
+    must(hello.to_frame())
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -335,10 +335,8 @@ async fn a_port_in_use_is_named() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn an_unreachable_server_is_given_up_in_time() {
     // A port that was free a moment ago, where nobody listens.
-    let socket = std::net::UdpSocket::bind("127.0.0.1:0").unwrap_or_else(|error| panic!("{error}"));
-    let address = socket
-        .local_addr()
-        .unwrap_or_else(|error| panic!("{error}"));
+    let socket = must(std::net::UdpSocket::bind("127.0.0.1:0"));
+    let address = must(socket.local_addr());
     drop(socket);
     let start = Instant::now();
     let error = error_of(ClientOptions {
@@ -364,9 +362,9 @@ async fn what_is_no_address_is_said_to_be_none() {
 
 #[test]
 fn a_key_file_is_made_once_private_and_read_again() {
-    let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+    let folder = must(tempfile::tempdir());
     let path = folder.path().join("cluster.key");
-    let made = taut_link::create_key_file(&path).unwrap_or_else(|error| panic!("{error}"));
+    let made = must(taut_link::create_key_file(&path));
     assert_eq!(taut_link::read_key_file(&path).ok(), Some(made));
     let again = taut_link::create_key_file(&path);
     assert!(matches!(

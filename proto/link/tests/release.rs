@@ -1,9 +1,6 @@
 //! Two releases meet: they agree on a version, or part by name, at both ends.
 
-use crate::support::{
-    relay::{Impairment, Waiting},
-    *,
-};
+use crate::support::*;
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 use taut_link::{
     ClientLink, ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport, connect,
@@ -13,14 +10,11 @@ use taut_proto::{
     PROTOCOL_VERSION, VersionRange,
     control::{ControlMessage, LENGTH_BYTES, RefusalCode},
 };
+use taut_test_kit::relay::Impairment;
 
 /// The first messages of the release before versions were negotiated.
 const VERSION_3: &str = include_str!("../../tests/golden_version_3.txt");
 const NEXT: u8 = PROTOCOL_VERSION + 1;
-
-fn must<T, E: std::fmt::Display>(result: Result<T, E>) -> T {
-    result.unwrap_or_else(|error| panic!("{error}"))
-}
 
 fn range(min: u8, max: u8) -> VersionRange {
     VersionRange::new(min, max).expect("a range")
@@ -42,16 +36,16 @@ async fn joined(options: ClientOptions) -> ClientLink {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_server_of_n_to_n_plus_1_and_a_client_of_n_plus_1_to_n_plus_2_speak_n_plus_1() {
-    let waiting = Waiting::new();
+    let port = relay_port();
     let server = server_with(ServerOptions {
         versions: range(PROTOCOL_VERSION, NEXT),
-        announced_udp_port: Some(waiting.port()),
+        announced_udp_port: Some(port.address().port()),
         idle_timeout: FORGIVING,
         node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
     })
     .await;
-    let relay = waiting.start(server.udp_addr(), Impairment::default(), 1);
+    let relay = start_relay(port, server.udp_addr(), Impairment::default(), 1);
     let newer = |role, name: &str| ClientOptions {
         versions: range(NEXT, NEXT + 1),
         ..options(&server, role, name)

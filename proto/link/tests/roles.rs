@@ -12,7 +12,7 @@ use taut_proto::{
 };
 
 fn credential(role: Role, name: &str, issue: u16) -> Credential {
-    let holder = Holder::of(name).unwrap_or_else(|error| panic!("{error}"));
+    let holder = must(Holder::of(name));
     key('a').credential(role, holder, issue)
 }
 
@@ -24,9 +24,7 @@ fn with(server: &ServerLink, role: Role, node: &str, credential: Credential) -> 
 }
 
 async fn join(options: ClientOptions) -> ClientLink {
-    connect(options)
-        .await
-        .unwrap_or_else(|error| panic!("{error}"))
+    must(connect(options).await)
 }
 
 fn head(index: u64) -> HeadSample {
@@ -254,8 +252,7 @@ async fn a_credential_is_not_even_shown_for_what_it_is_not() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_revoked_credential_and_a_closed_role_stay_outside_and_a_new_issue_comes_in() {
-    let revoked =
-        |text: &str| -> Revoked { text.parse().unwrap_or_else(|error| panic!("{error}")) };
+    let revoked = |text: &str| -> Revoked { must(text.parse()) };
     let server = server_with(ServerOptions {
         policy: JoinPolicy {
             roles: vec![Role::Render, Role::Device],

@@ -28,10 +28,6 @@ async fn serving(key: ClusterKey, also: Option<AlsoKey>) -> ServerLink {
     .await
 }
 
-fn must<T, E: std::fmt::Display>(result: Result<T, E>) -> T {
-    result.unwrap_or_else(|error| panic!("{error}"))
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn old_and_new_credentials_open_and_trust_one_server_while_both_keys_count() {
     let (new, old) = (key('a'), key('b'));

@@ -11,25 +11,20 @@ use taut_proto::{
 
 async fn states_arrive_over(transport: Transport) {
     let server = server().await;
-    let client = taut_link::connect(ClientOptions {
-        transport,
-        ..options(&server, Role::Render, "left")
-    })
-    .await
-    .unwrap_or_else(|error| panic!("{error}"));
+    let client = must(
+        taut_link::connect(ClientOptions {
+            transport,
+            ..options(&server, Role::Render, "left")
+        })
+        .await,
+    );
 
     assert_eq!(client.description(), &content().description);
     for mesh in content().meshes {
         let hash = hash_of(&mesh);
-        let fetched = client
-            .mesh(hash)
-            .await
-            .unwrap_or_else(|error| panic!("{error}"));
+        let fetched = must(client.mesh(hash).await);
         assert_eq!(*fetched, mesh);
-        let again = client
-            .mesh(hash)
-            .await
-            .unwrap_or_else(|error| panic!("{error}"));
+        let again = must(client.mesh(hash).await);
         assert!(
             std::sync::Arc::ptr_eq(&fetched, &again),
             "the second time it comes from memory"
@@ -110,12 +105,13 @@ async fn a_node_that_joins_late_gets_everything() {
 async fn a_client_gets_no_more_states_than_it_asked_for() {
     let server = server().await;
     let mut broadcaster = server.broadcaster();
-    let slow = taut_link::connect(ClientOptions {
-        rate_hz: 100,
-        ..options(&server, Role::Observer, "slow")
-    })
-    .await
-    .unwrap_or_else(|error| panic!("{error}"));
+    let slow = must(
+        taut_link::connect(ClientOptions {
+            rate_hz: 100,
+            ..options(&server, Role::Observer, "slow")
+        })
+        .await,
+    );
     let mut states = Vec::new();
     broadcast_until(&mut broadcaster, 1, || {
         slow.drain_states(&mut states);
@@ -233,12 +229,13 @@ async fn there_is_one_device_bridge() {
 async fn session_time_is_within_its_stated_uncertainty() {
     for transport in [Transport::Udp, Transport::QuicDatagram] {
         let server = server().await;
-        let client = taut_link::connect(ClientOptions {
-            transport,
-            ..options(&server, Role::Render, "left")
-        })
-        .await
-        .unwrap_or_else(|error| panic!("{error}"));
+        let client = must(
+            taut_link::connect(ClientOptions {
+                transport,
+                ..options(&server, Role::Render, "left")
+            })
+            .await,
+        );
         wait_until("clock lock", || client.session_now().is_some()).await;
         tokio::time::sleep(Duration::from_millis(300)).await;
         for _ in 0..20 {
@@ -289,10 +286,7 @@ async fn reports_and_log_lines_reach_the_server_and_drawn_states_are_compared() 
         ],
         ..ClientStats::default()
     };
-    client
-        .send_stats(stats.clone())
-        .await
-        .unwrap_or_else(|error| panic!("{error}"));
+    assert!(client.post_stats(stats.clone()));
     assert!(client.post_log(LogLevel::Warning, "software rendering".to_owned()));
     event(&server, "log", |event| matches!(event, LinkEvent::Log { node, event } if node == "left" && event.level == LogLevel::Warning)).await;
     let status = &server.clients()[0];
@@ -321,7 +315,6 @@ async fn clients_hear_that_the_server_stops() {
     server.shutdown().await;
     wait_until("closing", || client.is_closed().is_some()).await;
     assert_eq!(client.is_closed().as_deref(), Some("server is stopping"));
-    assert!(client.send_stats(ClientStats::default()).await.is_err());
     assert!(!client.post_stats(ClientStats::default()));
 }
 
@@ -392,9 +385,7 @@ async fn the_light_around_the_scene_comes_by_its_hash_and_is_not_served_without(
         Ok(_) => panic!("served without its light"),
     }
     content.panorama = Some(light.clone());
-    let server = serve(ServerOptions::loopback(key('a')), content)
-        .await
-        .unwrap_or_else(|error| panic!("{error}"));
+    let server = must(serve(ServerOptions::loopback(key('a')), content).await);
     let client = client(&server, Role::Render, "left").await;
     assert_eq!(client.description().environment, Some(hash));
     match client.panorama(hash).await {

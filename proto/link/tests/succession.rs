@@ -60,9 +60,7 @@ impl Leader {
             }),
             ..ServerOptions::loopback(key('a'))
         };
-        let server = runtime
-            .block_on(serve(options, content()))
-            .unwrap_or_else(|error| panic!("{error}"));
+        let server = must(runtime.block_on(serve(options, content())));
         let stop = Arc::new(AtomicBool::new(false));
         let sent = Arc::<Mutex<HashSet<u64>>>::default();
         let (mut broadcaster, clock) = (server.broadcaster(), server.clock());
@@ -167,9 +165,7 @@ impl Screen {
             RejoinPolicy::default(),
             prepare,
         );
-        let (supervised, first, ()) = runtime
-            .block_on(joined)
-            .unwrap_or_else(|error| panic!("{error}"));
+        let (supervised, first, ()) = must(runtime.block_on(joined));
         let mut screen = Screen {
             runtime: Some(runtime),
             supervised: Arc::new(supervised),
@@ -370,9 +366,7 @@ fn a_member_that_lies_makes_nobody_draw_what_the_server_did_not_send_and_is_not_
     let left = Screen::start(&leader, "left", 2);
     let right = Screen::start(&leader, "right", 2);
     let runtime = runtime();
-    let liar = runtime
-        .block_on(taut_link::connect(joining(&leader.server, "liar")))
-        .unwrap_or_else(|error| panic!("{error}"));
+    let liar = must(runtime.block_on(taut_link::connect(joining(&leader.server, "liar"))));
     leader.in_step(2);
     until("the roster", || {
         liar.roster().is_some_and(|roster| {

@@ -10,7 +10,7 @@ use taut_render::comfort::Comfort;
 use taut_render::environment::Environment;
 use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::{Stage, StageBody, StageScreen, TriangleMesh};
-use taut_render::timeline::{Latched, State};
+use taut_render::timeline::Latched;
 use taut_render::view::{ClipPlanes, Screen};
 
 /// Warm orange and light grey-blue, linear.
@@ -112,21 +112,7 @@ pub(crate) fn box_with_hole(half: f32, radius: f32, facets: u32) -> TriangleMesh
 
 /// A fresh state with the god-object at `pose` and the device there too.
 pub(crate) fn state(pose: Isometry3<f64>) -> Latched {
-    Latched {
-        sample_ns: 0,
-        state: State {
-            time_ns: 0,
-            source: (0, 0),
-            god_object: pose,
-            device: pose,
-            force: Vector3::zeros(),
-            head: None,
-            bodies: Vec::new(),
-            contacts: Vec::new(),
-        },
-        held: false,
-        stale: false,
-    }
+    Latched::at_rest(pose)
 }
 
 /// A canvas for the stage; `None`, said aloud, on a machine without a graphics adapter.

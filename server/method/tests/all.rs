@@ -7,7 +7,6 @@ mod collision_facing;
 mod collision_linear;
 mod collision_query_sets;
 mod collision_time_of_impact;
-mod collision_timing;
 mod contact_collection;
 mod coupling_adaptation;
 mod coupling_damping;

@@ -126,13 +126,13 @@ impl TracePlayer {
     /// The row that is due, without anything between rows.
     fn pose(&self, since_start: Duration) -> Pose {
         let (first, last) = (&self.trace[0], &self.trace[self.trace.len() - 1]);
-        let length = last.time_s - first.time_s;
+        let length = last.time - first.time;
         let time = if length > 0.0 {
-            first.time_s + since_start.as_secs_f64() % length
+            first.time + since_start.as_secs_f64() % length
         } else {
-            first.time_s
+            first.time
         };
-        let after = self.trace.partition_point(|row| row.time_s <= time);
+        let after = self.trace.partition_point(|row| row.time <= time);
         self.trace[after.saturating_sub(1)].pose
     }
 }
@@ -140,13 +140,13 @@ impl TracePlayer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use taut_bridge::TraceRow;
+    use taut_bridge::TraceSample;
 
     #[test]
     fn a_trace_begins_again_at_its_end() {
-        let row = |time_s: f64| TraceRow {
-            time_s,
-            pose: Pose::translation(time_s, 0.0, 0.0),
+        let row = |time: f64| TraceSample {
+            time,
+            pose: Pose::translation(time, 0.0, 0.0),
             buttons: 0,
         };
         let player = TracePlayer::new(vec![row(1.0), row(1.5), row(2.0)]).expect("three rows");

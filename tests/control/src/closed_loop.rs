@@ -10,7 +10,6 @@ use taut_plant::{Grip, Plant};
 pub const PERIOD: Duration = Duration::from_millis(1);
 
 /// The device of the published stability figures: 0.2 kg, `damping` N s/m, motors without limit.
-#[must_use]
 pub fn grip(damping: f64) -> Grip {
     Grip {
         damping: Vector3::repeat(damping),
@@ -48,7 +47,6 @@ pub struct Answer {
 
 impl ClosedLoop {
     /// Begins at the plant's time 0.
-    #[must_use]
     pub fn new(world: &World, settings: &Settings, set: ConstraintSet, plant: Plant) -> Self {
         Self {
             plant,
@@ -78,7 +76,6 @@ impl ClosedLoop {
 }
 
 /// From one pose to a later one nearby: m and rad, world axes.
-#[must_use]
 pub fn difference(to: &Pose, from: &Pose) -> Vector6 {
     god_object::spatial::pose_difference(to, from, &Vector3::zeros())
 }

@@ -148,7 +148,6 @@ pub struct Rubbing {
 
 impl Rubbing {
     /// Taps on a wall and slides along it.
-    #[must_use]
     pub fn on_wall() -> Self {
         Self::along(
             Task::wall(),
@@ -162,7 +161,6 @@ impl Rubbing {
     }
 
     /// Slides over a dome from side to side.
-    #[must_use]
     pub fn over_dome() -> Self {
         Self::along(
             Task::dome(),
@@ -176,7 +174,6 @@ impl Rubbing {
     }
 
     /// Holds still while a plate comes up at 0.1 m/s, lifts and tilts what is held and goes down again: the shipped scene, softer by hand.
-    #[must_use]
     pub fn lifted_by_plate() -> Self {
         let start = Pose::translation(0.0, 0.0, 0.030);
         let still = |time_s| ViaPoint {
@@ -193,13 +190,11 @@ impl Rubbing {
     }
 
     /// Goes down on a wall in half a second and stays there, 15 mm deep if nothing held it.
-    #[must_use]
     pub fn pressing_on_wall() -> Self {
         Self::down_on_wall(&[(0.0, 0.04), (0.5, 0.005)])
     }
 
     /// The same within so many seconds, once readings are good.
-    #[must_use]
     pub fn coming_down_on_wall(seconds: f64) -> Self {
         Self::down_on_wall(&[(0.0, 0.04), (0.6, 0.04), (0.6 + seconds, 0.005)])
     }
@@ -220,7 +215,6 @@ impl Rubbing {
     }
 
     /// Does once what the hand does in the study of coupling at the edge.
-    #[must_use]
     pub fn once(task: Task) -> Self {
         let path = task.intention.clone();
         Self { task, path }
@@ -248,20 +242,12 @@ impl Rubbing {
 }
 
 /// One run over `duration`; the same arguments give the same outcome.
-///
-/// # Panics
-/// When the scene of the task is none.
-#[must_use]
 pub fn run(rubbing: &Rubbing, mode: Mode, growth: Growth, duration: Duration) -> Outcome {
     // As `taut bridge` has it.
     run_with(Passivity::Control, rubbing, mode, growth, duration)
 }
 
 /// The same with this said of energy.
-///
-/// # Panics
-/// When the scene of the task is none.
-#[must_use]
 pub fn run_with(
     passivity: Passivity,
     rubbing: &Rubbing,
@@ -314,10 +300,6 @@ pub struct Disturbance {
 }
 
 /// What is felt in each of `ticks` milliseconds, N; without control of energy, whose reserve is less than what a light hand is pushed back by.
-///
-/// # Panics
-/// When the scene of the task is none.
-#[must_use]
 pub fn felt_under(
     disturbance: &Disturbance,
     rubbing: &Rubbing,

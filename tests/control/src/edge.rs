@@ -52,7 +52,6 @@ pub enum Mode {
 
 impl Mode {
     /// For tables.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Edge => "edge",
@@ -83,7 +82,6 @@ pub struct Outcome {
 }
 
 /// One run of `task`; the same arguments give the same bytes.
-#[must_use]
 pub fn run(task: &Task, mode: Mode, impairment: Impairment, seed: u64) -> Outcome {
     let (mut up, mut down) = (
         Way::new(impairment, 2 * seed + 1),
@@ -353,10 +351,6 @@ impl Seen {
 }
 
 /// The god-object of a task, at its start.
-///
-/// # Panics
-/// When the task starts in penetration.
-#[must_use]
 pub fn god_object(task: &Task) -> GodObject {
     let world = Arc::new(task.scene.world.clone());
     GodObject::new(world, task.scene.settings, task.scene.start)

@@ -24,7 +24,6 @@ const MEASURED_TORQUE: f64 = 0.06;
 const DIRECTED: f64 = 0.1;
 
 /// The error of `wrench` against `ideal` in just-noticeable differences.
-#[must_use]
 pub fn jnd(wrench: &Vector6<f64>, ideal: &Vector6<f64>) -> f64 {
     let (force, right): (Vector3<f64>, Vector3<f64>) = (
         wrench.fixed_rows::<3>(0).into(),
@@ -61,7 +60,6 @@ pub struct Quantiles {
 
 impl Quantiles {
     /// Of `values`, which are put in order; zeros for none.
-    #[must_use]
     pub fn of(values: &mut [f64]) -> Self {
         values.sort_unstable_by(f64::total_cmp);
         let at = |share: f64| {

@@ -18,7 +18,6 @@ pub struct Impairment {
 
 impl Impairment {
     /// `delay_ms` with a tenth of it as jitter, and `loss` in percent.
-    #[must_use]
     pub fn new(delay_ms: f64, loss_percent: f64) -> Self {
         Self {
             delay_ns: (delay_ms * 1e6) as u64,
@@ -42,7 +41,6 @@ pub struct Way {
 
 impl Way {
     /// A way with a key of its own.
-    #[must_use]
     pub fn new(impairment: Impairment, seed: u64) -> Self {
         let material = [seed as u8; KEY_MATERIAL_BYTES];
         Self {
@@ -62,9 +60,6 @@ impl Way {
     }
 
     /// Seals `payload` and lets it go at `now_ns`.
-    ///
-    /// # Panics
-    /// When the payload has no encoding: a number that is not finite.
     pub fn send(&mut self, now_ns: u64, payload: &Payload) {
         let mut buffer = [0; MAX_DATAGRAM_BYTES];
         let datagram = match self.sealer.seal(payload, &mut buffer) {
@@ -82,9 +77,6 @@ impl Way {
     }
 
     /// Hands over what has arrived by `now_ns`, earliest first.
-    ///
-    /// # Panics
-    /// When a datagram does not open: the codec is broken.
     pub fn receive(&mut self, now_ns: u64, mut take: impl FnMut(Payload)) {
         self.under_way
             .sort_unstable_by_key(|(arrival, send, _)| (*arrival, *send));
@@ -100,16 +92,12 @@ impl Way {
     }
 
     /// Datagrams and bytes sent.
-    #[must_use]
     pub fn sent(&self) -> (u64, u64) {
         (self.sends, self.bytes)
     }
 }
 
 /// Bytes to a payload and back, for what travels without a network.
-///
-/// # Errors
-/// As the codec says.
 pub fn through_the_codec(payload: &Payload) -> Result<Payload, DecodeError> {
     let mut buffer = [0; taut_proto::header::MAX_PAYLOAD_BYTES];
     let used = payload.encode_into(&mut buffer).unwrap_or(0);

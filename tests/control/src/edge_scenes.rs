@@ -38,7 +38,6 @@ pub struct Task {
 
 impl Task {
     /// Presses a ball on a wall, slides it and lifts it.
-    #[must_use]
     pub fn wall() -> Self {
         let at = |x, z| Pose::translation(x, 0.0, z);
         let pressed = RADIUS - DEPTH;
@@ -59,7 +58,6 @@ impl Task {
     }
 
     /// A plate comes up under what is held: the shipped scene.
-    #[must_use]
     pub fn plate() -> Self {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../../server/scenes/moving-plate.toml");
@@ -74,7 +72,6 @@ impl Task {
     }
 
     /// Slides a ball along a floor into one wall and then into another.
-    #[must_use]
     pub fn corner() -> Self {
         let at = Pose::translation;
         let pressed = RADIUS - DEPTH;
@@ -96,7 +93,6 @@ impl Task {
 
     /// Slides a ball over another one, from one side of it to the other: the centres stay 50 mm apart, so that half-spaces are
     /// wrong by a radian every 50 mm.
-    #[must_use]
     pub fn dome() -> Self {
         let at = |x, z| Pose::translation(x, 0.0, z);
         Self {
@@ -116,7 +112,6 @@ impl Task {
     }
 
     /// Puts a peg (288 triangles) into a hole (280 triangles) with 0.5 mm of clearance, presses it to the side and tilts it there, and takes it out.
-    #[must_use]
     pub fn peg() -> Self {
         let at = |x, y| Pose::translation(x, y, 0.0);
         let tilted = Pose::new(Vector3::new(DEPTH, 0.01, 0.0), Vector3::z() * 0.4);
@@ -143,7 +138,6 @@ impl Task {
     }
 
     /// All of them.
-    #[must_use]
     pub fn all() -> [Self; 4] {
         [Self::wall(), Self::corner(), Self::dome(), Self::peg()]
     }

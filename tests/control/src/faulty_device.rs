@@ -101,7 +101,6 @@ impl Stroke {
     const BEGIN: Duration = Duration::from_secs(10);
 
     /// The hand goes along x at 10 mm in the wall, 0.3 m in 1.6 s, fastest at [`FAULT_AT`].
-    #[must_use]
     pub fn new(failure: Failure, settings: SafetySettings, buttons: u16) -> Self {
         let via = |time_s, x| ViaPoint {
             time_s,
@@ -136,7 +135,6 @@ impl Stroke {
     }
 
     /// Time since the begin.
-    #[must_use]
     pub fn passed(&self) -> Duration {
         self.now - Self::BEGIN
     }

@@ -17,7 +17,6 @@ pub struct Row {
 
 impl Row {
     /// A number that must be within a share of the expected one.
-    #[must_use]
     pub fn within(
         case: impl fmt::Display,
         measured: f64,
@@ -34,7 +33,6 @@ impl Row {
     }
 
     /// A number that must not be above a limit.
-    #[must_use]
     pub fn at_most(case: impl fmt::Display, measured: f64, limit: f64, unit: &str) -> Self {
         Self {
             case: case.to_string(),
@@ -45,7 +43,6 @@ impl Row {
     }
 
     /// Something that must be so.
-    #[must_use]
     pub fn holds(
         case: impl fmt::Display,
         measured: impl fmt::Display,

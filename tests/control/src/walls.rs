@@ -10,7 +10,6 @@ use taut_scene::shapes::cuboid;
 pub const HALF_LENGTH: f64 = 0.05;
 
 /// A cube of 1 kg alone.
-#[must_use]
 pub fn cube() -> World {
     World {
         body: body(mesh(cuboid([HALF_LENGTH; 3]))),
@@ -19,7 +18,6 @@ pub fn cube() -> World {
 }
 
 /// A coupling that renders `stiffness` (N/m) with 1 kg, linear up to any force.
-#[must_use]
 pub fn linear(stiffness: f64) -> Settings {
     let defaults = Settings::for_size(2.0 * HALF_LENGTH);
     Settings {
@@ -33,7 +31,6 @@ pub fn linear(stiffness: f64) -> Settings {
 
 /// Contacts of a body whose reference point is at the origin: point and normal each, at rest distance, so that force begins at
 /// once.
-#[must_use]
 pub fn contacts(settings: &Settings, places: &[(Point3<f64>, Vector3<f64>)]) -> ConstraintSet {
     let mut set = ConstraintSet::with_capacity(places.len());
     set.gap_min = settings.rest_distance;
@@ -56,7 +53,6 @@ pub fn contacts(settings: &Settings, places: &[(Point3<f64>, Vector3<f64>)]) -> 
 }
 
 /// A wall that holds the reference point from both sides along x.
-#[must_use]
 pub fn both_sides_of_x() -> Vec<(Point3<f64>, Vector3<f64>)> {
     vec![
         (Point3::origin(), Vector3::x()),
@@ -65,13 +61,11 @@ pub fn both_sides_of_x() -> Vec<(Point3<f64>, Vector3<f64>)> {
 }
 
 /// A wall at x = 0 that holds the reference point above it.
-#[must_use]
 pub fn above_x() -> Vec<(Point3<f64>, Vector3<f64>)> {
     vec![(Point3::origin(), Vector3::x())]
 }
 
 /// Stops on both sides of a body's ends along x: they hold it in y and about z.
-#[must_use]
 pub fn stops_about_z() -> Vec<(Point3<f64>, Vector3<f64>)> {
     [HALF_LENGTH, -HALF_LENGTH]
         .into_iter()

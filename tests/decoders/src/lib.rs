@@ -20,9 +20,6 @@ pub struct Decoder {
     /// Name, also of its corpus.
     pub name: &'static str,
     /// Reads or refuses the bytes.
-    ///
-    /// # Panics
-    /// If a promise is broken: that is the finding.
     pub feed: fn(&[u8]),
     /// Valid inputs to begin with.
     pub seeds: fn() -> Vec<Vec<u8>>,
@@ -153,10 +150,6 @@ const fn decoder(
 }
 
 /// The decoder of this name.
-///
-/// # Panics
-/// When there is none.
-#[must_use]
 pub fn named(name: &str) -> Decoder {
     let found = DECODERS.into_iter().find(|decoder| decoder.name == name);
     found.unwrap_or_else(|| panic!("there is no decoder `{name}`"))

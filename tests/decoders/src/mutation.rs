@@ -8,7 +8,6 @@ pub struct Numbers(u64);
 
 impl Numbers {
     /// Numbers of a seed.
-    #[must_use]
     pub fn new(seed: u64) -> Numbers {
         Numbers(seed)
     }
@@ -62,7 +61,6 @@ const MAX_CHANGES: usize = 4;
 const MAX_BYTES: usize = 1 << 16;
 
 /// One to four changes to one of `seeds`: bits, bytes, boundary numbers, words, cuts, repetitions, parts of another seed.
-#[must_use]
 pub fn mutated(seeds: &[Vec<u8>], numbers: &mut Numbers) -> Vec<u8> {
     let mut bytes = match seeds.get(numbers.below(seeds.len())) {
         Some(seed) => seed.clone(),

@@ -4,14 +4,13 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::random::Random;
+use crate::xorshift::Random;
 
 /// Vertices, m, and triangles.
 pub type Soup = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 
 /// Each triangle in four by the middles of its sides; the new vertices leave their sides along the mean normal by a smooth
 /// wave and by rough noise of `ROUGHNESS` of the side's length. The old vertices stay.
-#[must_use]
 pub fn subdivided(soup: &Soup, times: u32) -> Soup {
     const ROUGHNESS: f64 = 0.03;
     const WAVE: f64 = 0.02;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
-use crate::random::Random;
+use crate::xorshift::Random;
 
 /// A hand that presses a body towards the origin and slides it around, a step at a time.
 #[derive(Debug)]
@@ -17,22 +17,14 @@ pub struct SlidingHand {
 }
 
 impl SlidingHand {
-    /// Shortest and longest step unless others are given, m; greatest rotation in a step, rad; how deep it presses, m.
-    const STEP: [f64; 2] = [0.5e-3, 3e-3];
+    /// Greatest rotation in a step, rad; how deep it presses, m.
     const TURN: f64 = 0.5_f64.to_radians();
     const DEPTH: [f64; 2] = [1e-3, 3e-3];
     /// The hand does not turn further from the body than this, rad: a hand feels the torque.
     const TWIST: f64 = 3.0_f64.to_radians();
 
-    /// A hand at `pose`; its steps follow from the seed.
-    #[must_use]
-    pub fn new(pose: Isometry3<f64>, seed: u64) -> Self {
-        Self::with_steps(pose, seed, Self::STEP)
-    }
-
-    /// The same with its shortest and longest step, m.
-    #[must_use]
-    pub fn with_steps(pose: Isometry3<f64>, seed: u64, step: [f64; 2]) -> Self {
+    /// A hand at `pose` with its shortest and longest step, m; its steps follow from the seed.
+    pub fn new(pose: Isometry3<f64>, seed: u64, step: [f64; 2]) -> Self {
         Self {
             pose,
             random: Random::new(seed),

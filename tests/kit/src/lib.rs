@@ -3,7 +3,10 @@
 mod clock;
 mod dense;
 mod hand;
-mod random;
+pub mod random;
+pub mod relay;
+pub mod strings;
+mod xorshift;
 
 use std::fmt::Display;
 
@@ -30,9 +33,6 @@ k_h = 2000.0
 pub const REQUIRE_VARIABLE: &str = "TAUT_REQUIRE";
 
 /// Says that a test, or a part of it, is left out for lack of test data, a graphics driver or a device.
-///
-/// # Panics
-/// `TAUT_REQUIRE=1`: nothing may be left out.
 #[allow(
     clippy::disallowed_methods,
     reason = "tests may read the environment; the method may not"

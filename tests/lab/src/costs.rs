@@ -40,7 +40,6 @@ pub struct Cost {
 
 impl Cost {
     /// Of an update at a share of all, us: the median below it, straight lines between the percentiles, the last one beyond.
-    #[must_use]
     pub fn at(&self, share: f64) -> f64 {
         let [p50, p90, p99] = self.update;
         let between = |from: usize, low: f64, high: f64| {
@@ -56,7 +55,6 @@ impl Cost {
 }
 
 /// The cost of a method in a case, from the committed table.
-#[must_use]
 pub fn of(recipe: &Recipe, method: Method, tuning: Tuning, rate: u32) -> Option<Cost> {
     static COSTS: OnceLock<HashMap<String, Cost>> = OnceLock::new();
     let costs = COSTS.get_or_init(|| read(TABLE));
@@ -64,7 +62,6 @@ pub fn of(recipe: &Recipe, method: Method, tuning: Tuning, rate: u32) -> Option<
 }
 
 /// The machine that the table was made on.
-#[must_use]
 pub fn machine() -> &'static str {
     TABLE.lines().next().unwrap_or("").trim_start_matches("# ")
 }
@@ -79,7 +76,6 @@ pub(crate) fn uniform(state: &mut u64) -> f64 {
 }
 
 /// A seed for the draws of a run from one start phase: other phases, other draws.
-#[must_use]
 pub fn seed(recipe: &Recipe, method: Method, tuning: Tuning, rate: u32, phase: f64) -> u64 {
     let name = format!("{} {phase}", key(recipe, method, tuning, rate));
     let bytes = blake3::hash(name.as_bytes());
@@ -117,7 +113,6 @@ fn read(table: &str) -> HashMap<String, Cost> {
 }
 
 /// Runs everything once and writes the table. `done` is called after each case.
-#[must_use]
 pub fn measure(methods: &[Method], done: impl Fn(usize, usize) + Sync) -> String {
     let mut recipes = all(Extent::Full);
     let also: Vec<Recipe> = all(Extent::Quick)

@@ -3,14 +3,12 @@
 use rustix::time::{ClockId, clock_gettime};
 
 /// CPU time that this thread has used, us.
-#[must_use]
 pub fn thread_us() -> f64 {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     time.tv_sec as f64 * 1e6 + time.tv_nsec as f64 * 1e-3
 }
 
 /// The value below which the share `share` of the `values` lies (nearest rank); NaN of none.
-#[must_use]
 pub fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -44,7 +44,6 @@ pub struct Felt {
 
 impl Felt {
     /// Of a run against the right answer. `arm`: radius of the body about its reference point, m.
-    #[must_use]
     pub fn new(ticks: &[Tick], ideal: &[Vector6], arm: f64) -> Self {
         let forces: Vec<_> = ticks.iter().map(|tick| linear(&tick.wrench)).collect();
         let right: Vec<_> = ideal.iter().map(linear).collect();
@@ -64,19 +63,16 @@ impl Felt {
     }
 
     /// 95th percentile; NaN where there is no right answer.
-    #[must_use]
     pub fn p95(&self) -> f64 {
         quantile(&self.each, 0.95)
     }
 
     /// Its largest.
-    #[must_use]
     pub fn most(&self) -> f64 {
         quantile(&self.each, 1.0)
     }
 
     /// Share of the time above one just-noticeable difference; NaN where there is no right answer.
-    #[must_use]
     pub fn share_above_one(&self) -> f64 {
         let above = self.each.iter().filter(|j| **j > 1.0 || j.is_nan()).count();
         above as f64 / self.each.len() as f64

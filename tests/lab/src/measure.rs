@@ -45,11 +45,9 @@ macro_rules! measures {
             pub const ALL: &[Self] = &[$(Self::$name,)*];
 
             /// Name in tables and files.
-            #[must_use]
             pub fn key(self) -> &'static str { match self { $(Self::$name => $key,)* } }
 
             /// Its unit.
-            #[must_use]
             pub fn unit(self) -> &'static str { match self { $(Self::$name => $unit,)* } }
         }
     };
@@ -114,7 +112,6 @@ pub struct Measures {
 
 impl Measures {
     /// Of a run of a recipe.
-    #[must_use]
     pub fn of(recipe: &Recipe, ticks: &[Tick]) -> Self {
         let ideal = &recipe.answer().wrenches;
         let errors = ForceErrors::new(ticks, ideal);
@@ -172,7 +169,6 @@ impl Measures {
     }
 
     /// One of them.
-    #[must_use]
     pub fn get(&self, measure: Measure) -> f64 {
         self.values[measure as usize]
     }

@@ -12,7 +12,6 @@ use crate::recipe::Recipe;
 pub const TRAINING: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
 
 /// The `count` start phases that a recipe is judged from: the middles of as many parts of a period, (2 k + 1) / (2 n).
-#[must_use]
 pub fn judged(count: u32) -> Vec<f64> {
     let phases = (0..count).map(|k| (f64::from(k) + 0.5) / f64::from(count));
     phases.collect()
@@ -99,15 +98,8 @@ impl Measured {
     }
 
     /// The largest value over the phases; NaN where one is.
-    #[must_use]
     pub fn worst(&self, measure: Measure) -> f64 {
-        let values = self.phases.iter().map(|phase| phase.get(measure));
-        values.fold(
-            f64::NEG_INFINITY,
-            |a, b| {
-                if a.is_nan() || a > b { a } else { b }
-            },
-        )
+        largest(self.phases.iter().map(|phase| phase.get(measure)))
     }
 
     /// Times, number of probes, then measures and probes phase by phase.
@@ -145,6 +137,14 @@ impl Measured {
             },
         })
     }
+}
+
+/// The largest of the values; NaN where one is.
+pub(crate) fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(
+        f64::NEG_INFINITY,
+        |a, b| if a.is_nan() || a > b { a } else { b },
+    )
 }
 
 /// Of so many updates, which took `charged` of `spanned` s on the virtual clock.

@@ -64,7 +64,6 @@ pub struct Scene {
 
 impl Scene {
     /// With the default settings for a body of this size, m, and a device of this speed, m/s.
-    #[must_use]
     pub fn new(world: World, size: f64, speed: f64, start: Pose) -> Self {
         let settings = world.settings_for(Settings::for_size(size));
         Self {
@@ -77,7 +76,6 @@ impl Scene {
 
     /// The settings of [`Method::Ours`]: how far it looks ahead is fitted to the speed of the device and the time between updates, s, and
     /// how many pairs it may look at for that to this time.
-    #[must_use]
     pub fn fitted(&self, period: f64) -> Settings {
         let reach = LOOK_AHEAD_PERIODS * self.speed * period;
         let pairs = (LOOK_AHEAD_SHARE * period / PAIR_TIME) as u64;
@@ -89,7 +87,6 @@ impl Scene {
     }
 
     /// Translational stiffness that the hand is to feel, N/m.
-    #[must_use]
     pub fn stiffness(&self) -> f64 {
         self.settings.stiffness(self.world.body.mass)
     }
@@ -149,7 +146,6 @@ impl Method {
     pub const CONTROLS: [Self; 2] = [Self::DoesNothing, Self::RandomForce];
 
     /// Name in tables and files.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Ours => "ours",
@@ -166,7 +162,6 @@ impl Method {
     }
 
     /// The settings among which the best is searched for each recipe and rate; the first is the default.
-    #[must_use]
     pub fn tunings(self) -> Vec<Tuning> {
         match self {
             Self::Ours | Self::OursByDefault | Self::DoesNothing | Self::RandomForce => {
@@ -199,11 +194,6 @@ impl Method {
     }
 
     /// The method at the start of a scene, updated every `period` seconds.
-    ///
-    /// # Panics
-    ///
-    /// Where the scene cannot be started: recipes are made in code.
-    #[must_use]
     pub fn start(self, scene: &Scene, period: f64, tuning: Tuning) -> Box<dyn HapticMethod> {
         let mut by_default = scene.settings;
         if let Tuning::Touching(share) = tuning {

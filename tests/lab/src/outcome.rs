@@ -2,7 +2,7 @@
 
 use crate::clock::RATES;
 use crate::measure::{Measure, Measures};
-use crate::measured::{Load, Measured, Payer, TRAINING, Times, judged};
+use crate::measured::{Load, Measured, Payer, TRAINING, Times, judged, largest};
 use crate::method::{Method, Tuning};
 use crate::recipe::{Ideal, Line, Recipe};
 use crate::reference::{FORCE_ERROR, TORQUE_ERROR};
@@ -48,7 +48,6 @@ pub struct Trial {
 impl Outcome {
     /// Runs a recipe with the best of the method's tunings: that which is felt least from the phases for [`TRAINING`], and of these the one
     /// that misses the fewest lines.
-    #[must_use]
     pub fn of(recipe: &Recipe, method: Method, rate: u32) -> Self {
         let tunings = method.tunings();
         let tried: Vec<Self> = match tunings.as_slice() {
@@ -75,7 +74,6 @@ impl Outcome {
     }
 
     /// Runs a recipe with this tuning.
-    #[must_use]
     pub fn tuned(recipe: &Recipe, method: Method, rate: u32, tuning: Tuning) -> Self {
         Self::from_phases(recipe, method, rate, tuning, &judged(recipe.phases))
     }
@@ -177,19 +175,11 @@ impl Outcome {
     }
 
     /// The largest value over the phases; NaN where one is.
-    #[must_use]
     pub fn worst(&self, measure: Measure) -> f64 {
-        let values = self.phases.iter().map(|phase| phase.get(measure));
-        values.fold(
-            f64::NEG_INFINITY,
-            |a, b| {
-                if a.is_nan() || a > b { a } else { b }
-            },
-        )
+        largest(self.phases.iter().map(|phase| phase.get(measure)))
     }
 
     /// The mean over the phases.
-    #[must_use]
     pub fn mean(&self, measure: Measure) -> f64 {
         let sum: f64 = self.phases.iter().map(|phase| phase.get(measure)).sum();
         sum / self.phases.len() as f64
@@ -197,15 +187,10 @@ impl Outcome {
 
     /// The largest value of a probe over the phases; NaN where one is.
     fn worst_probe(&self, probe: usize) -> f64 {
-        let values = self.phases.iter().map(|phase| phase.probes[probe]);
-        values.fold(
-            f64::NEG_INFINITY,
-            |a, b| if a.is_nan() || a > b { a } else { b },
-        )
+        largest(self.phases.iter().map(|phase| phase.probes[probe]))
     }
 
     /// Names of the lines and probes that it missed.
-    #[must_use]
     pub fn missed(&self, recipe: &Recipe) -> Vec<&'static str> {
         let lines = self.lines.iter().filter(|(_, passes)| !passes);
         let probes = recipe.probes.iter().enumerate().filter(|(index, probe)| {

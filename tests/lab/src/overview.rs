@@ -48,7 +48,6 @@ pub struct Summary {
 }
 
 /// Every method at every rate that was run.
-#[must_use]
 pub fn summaries(rows: &[Row], outcomes: &[Outcome]) -> Vec<Summary> {
     let each = Method::ALL
         .iter()
@@ -87,7 +86,6 @@ pub fn summaries(rows: &[Row], outcomes: &[Outcome]) -> Vec<Summary> {
 }
 
 /// As CSV; the last columns are times.
-#[must_use]
 pub fn csv(summaries: &[Summary]) -> String {
     let mut text = String::from(
         "method,rate_hz,cases,passed,j_quarter,j_median,j_three_quarters,\

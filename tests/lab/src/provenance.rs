@@ -17,13 +17,11 @@ const CRATES: [&str; 5] = [
 const SECONDS_A_DAY: u64 = 86_400;
 
 /// The model of the first processor, as Linux names it.
-#[must_use]
 pub fn processor() -> String {
     value_of("/proc/cpuinfo", "model name")
 }
 
 /// Names and values, in the order in which they are shown.
-#[must_use]
 pub fn all() -> Vec<(&'static str, String)> {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     let kernel = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();

@@ -25,7 +25,6 @@ pub struct Line {
 
 impl Line {
     /// `measure <= limit`.
-    #[must_use]
     pub fn at_most(measure: Measure, limit: f64) -> Self {
         Self { measure, limit }
     }
@@ -156,7 +155,6 @@ pub struct Recipe {
 
 impl Recipe {
     /// A recipe without a right answer, lines or probes yet: the rest is filled in by struct update.
-    #[must_use]
     pub fn new(
         (name, case): (&'static str, String),
         about: &'static str,
@@ -188,7 +186,6 @@ impl Recipe {
     }
 
     /// How many ticks it takes.
-    #[must_use]
     pub fn ticks(&self) -> u32 {
         (self.duration / TICK).round() as u32 + 1
     }
@@ -206,7 +203,6 @@ impl Recipe {
 
     /// What every recipe with a right answer asks of what is felt: half a just-noticeable difference at the 95th percentile, and
     /// above one at most a hundredth of the time.
-    #[must_use]
     pub fn felt_lines(&self) -> Vec<Line> {
         if matches!(self.ideal, Ideal::None) {
             return Vec::new();

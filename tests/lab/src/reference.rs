@@ -91,7 +91,6 @@ impl Answer {
 }
 
 /// Where answers are cached: `target/lab/references`.
-#[must_use]
 pub fn directory() -> PathBuf {
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../target"),

@@ -90,7 +90,6 @@ pub struct Replayed {
 }
 
 /// Where the data are: in this repository.
-#[must_use]
 pub fn directory() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../data/measured")
 }
@@ -164,7 +163,6 @@ pub fn replay(trial: &str, method: Method, choice: Choice) -> Result<Replayed, B
 }
 
 /// As CSV, a row for each trial and method, and one for all trials of a method.
-#[must_use]
 pub fn csv(all: &[Replayed]) -> String {
     let mut text = String::from(
         "trial,registered_by,method,stiffness,instants,angle_p50_deg,angle_p90_deg,angle_p99_deg,\
@@ -206,7 +204,6 @@ pub fn csv(all: &[Replayed]) -> String {
 }
 
 /// Of angles and residuals.
-#[must_use]
 pub fn percentiles(of: [&[f64]; 2]) -> [[f64; 3]; 2] {
     of.map(|values| SHARES.map(|share| quantile(values, share)))
 }

@@ -22,7 +22,6 @@ use crate::row::{Row, Verdict};
 use crate::score::Score;
 
 /// What was missed of these rows, each by how much; `pass` where nothing was, `open` where that is known.
-#[must_use]
 pub fn verdict(rows: &[Row]) -> String {
     let mut missed = Vec::new();
     let (mut failed, mut lines) = (false, false);
@@ -56,7 +55,6 @@ pub fn verdict(rows: &[Row]) -> String {
 }
 
 /// What each method came to in the cases that all of them can run, and whose costs were charged.
-#[must_use]
 pub fn headlines(scores: &[Score]) -> String {
     let mut text = format!("Costs of updates: {}.\n\n", costs::machine());
     for score in scores {
@@ -67,7 +65,6 @@ pub fn headlines(scores: &[Score]) -> String {
 }
 
 /// The table for people: costs are those of the committed table, so it is the same in every run.
-#[must_use]
 pub fn table(rows: &[Row]) -> String {
     let mut text = String::from(
         "| recipe | case | method | settings | asked | held | of a core | J p95 | verdict |\n",
@@ -116,7 +113,6 @@ pub fn write(
 }
 
 /// Rows as CSV, without their times.
-#[must_use]
 pub fn rows_csv(rows: &[Row]) -> String {
     let mut text = String::from(
         "recipe,case,method,settings,rate_hz,held_hz,core_share,measure,value,unit,limit,verdict,reason\n",

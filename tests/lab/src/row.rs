@@ -62,7 +62,6 @@ pub struct Row {
 
 impl Row {
     /// A row of a recipe for a player, without a measure yet.
-    #[must_use]
     pub fn new(recipe: &'static str, case: impl fmt::Display, method: impl fmt::Display) -> Self {
         Self {
             recipe,

@@ -24,7 +24,6 @@ pub struct Score {
 
 impl Score {
     /// How many cases are within the budget.
-    #[must_use]
     pub fn within(&self) -> usize {
         self.cases
             .values()
@@ -33,7 +32,6 @@ impl Score {
     }
 
     /// Each line that was missed, and in how many cases; the one that most missed comes first.
-    #[must_use]
     pub fn reasons(&self) -> Vec<(&'static str, usize)> {
         let mut reasons = BTreeMap::new();
         for line in self.cases.values().flatten() {
@@ -45,7 +43,6 @@ impl Score {
     }
 
     /// `n of m common cases within the budget`, the lines that were missed, and the cases that are not by name.
-    #[must_use]
     pub fn headline(&self) -> String {
         let outside: Vec<String> = (self.cases.iter())
             .filter(|(_, missed)| !missed.is_empty())
@@ -71,7 +68,6 @@ impl Score {
 }
 
 /// A score for each of the methods and rates that were run. `methods` are those that are compared: a case that one of them has no part in counts for none.
-#[must_use]
 pub fn scores(recipes: &[&Recipe], outcomes: &[Outcome], methods: &[Method]) -> Vec<Score> {
     let mut scores: Vec<Score> = Vec::new();
     for outcome in outcomes {

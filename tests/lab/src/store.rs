@@ -27,13 +27,11 @@ pub struct Store {
 
 impl Store {
     /// Nothing is kept.
-    #[must_use]
     pub fn none() -> Self {
         Self::default()
     }
 
     /// Kept in a folder, which is made when the first result is.
-    #[must_use]
     pub fn in_directory(directory: &Path) -> Self {
         Self {
             directory: Some(directory.to_owned()),

@@ -11,7 +11,6 @@ pub struct Convex {
 
 impl Convex {
     /// A box along the axes between two corners.
-    #[must_use]
     pub fn cuboid(low: Point3<f64>, high: Point3<f64>) -> Self {
         let planes = (0..3).flat_map(|axis| {
             let unit = Vector3::from_fn(|row, _| f64::from(u8::from(row == axis)));
@@ -23,7 +22,6 @@ impl Convex {
     }
 
     /// How far a point is from the nearest plane, from inside; 0 outside.
-    #[must_use]
     pub fn depth(&self, point: &Point3<f64>) -> f64 {
         self.planes
             .iter()
@@ -33,7 +31,6 @@ impl Convex {
     }
 
     /// The deepest vertex of a mesh at a pose.
-    #[must_use]
     pub fn deepest(&self, mesh: &Mesh, world_from_body: &Pose) -> f64 {
         mesh.vertices()
             .iter()

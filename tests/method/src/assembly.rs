@@ -97,7 +97,6 @@ impl Assembly {
     /// Leads the body along the trace, one row in `every`, and checks the pose after every update in `check_every`.
     ///
     /// `progress` is called with the share of the way that is done.
-    #[must_use]
     pub fn run(
         scene: &BuiltScene,
         trace: &DeviceTrace,

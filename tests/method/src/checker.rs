@@ -25,7 +25,6 @@ struct Obstacle {
 
 impl PenetrationChecker {
     /// Of the world's body and all its obstacles.
-    #[must_use]
     pub fn new(world: &World) -> Self {
         let obstacles = world.obstacles.iter().map(|obstacle| {
             let vertices = vertices_in_world(&obstacle.mesh, &obstacle.pose);

@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 
 use god_object::Pose;
 use nalgebra::{UnitQuaternion, Vector3};
+pub use taut_test_kit::random::Random;
 
 /// A hand's physiological tremor lies here, Hz.
 const TREMOR_FREQUENCIES: [f64; 5] = [8.0, 9.0, 10.0, 11.0, 12.0];
@@ -24,7 +25,6 @@ pub struct HandError {
 
 impl HandError {
     /// 0.5 mm beside the path, 0.6 degrees askew, a tremor of 60 um rms on each axis between 8 and 12 Hz.
-    #[must_use]
     pub fn of_a_hand(seed: u64) -> Self {
         let mut random = Random(seed);
         Self {
@@ -36,7 +36,6 @@ impl HandError {
     }
 
     /// The same hand, resting on something.
-    #[must_use]
     pub fn without_tremor(&self) -> Self {
         Self {
             tremor: 0.0,
@@ -45,7 +44,6 @@ impl HandError {
     }
 
     /// Where the hand is that means to be at `pose`, with the share `constant` of offset and tilt.
-    #[must_use]
     pub fn at(&self, time: f64, pose: &Pose, constant: f64) -> Pose {
         let turn = UnitQuaternion::from_scaled_axis(self.tilt * constant);
         let moved = pose.translation.vector + self.offset * constant + self.tremor_at(time);
@@ -60,46 +58,6 @@ impl HandError {
             sines.map(|(f, phase)| (TAU * f * time + phase).sin()).sum()
         };
         Vector3::from_iterator(self.phases.iter().map(axis)) * amplitude
-    }
-}
-
-/// A small deterministic generator (SplitMix64): the same numbers on every machine.
-#[derive(Clone, Debug)]
-pub struct Random(pub u64);
-
-impl Random {
-    /// Uniform in [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Uniform on the unit sphere.
-    pub fn direction(&mut self) -> Vector3<f64> {
-        loop {
-            let v = Vector3::from_fn(|_, _| 2.0 * self.unit() - 1.0);
-            let norm = v.norm();
-            if norm > 0.1 && norm < 1.0 {
-                return v / norm;
-            }
-        }
-    }
-
-    /// A rotation, uniform over all of them.
-    pub fn rotation(&mut self) -> UnitQuaternion<f64> {
-        // Source: Shoemake 1992, "Uniform random rotations".
-        let (u, v, w) = (self.unit(), TAU * self.unit(), TAU * self.unit());
-        let (a, b) = ((1.0 - u).sqrt(), u.sqrt());
-        UnitQuaternion::new_normalize(nalgebra::Quaternion::new(
-            b * w.cos(),
-            a * v.sin(),
-            a * v.cos(),
-            b * w.sin(),
-        ))
     }
 }
 

@@ -27,19 +27,16 @@ pub struct Gear {
 
 impl Gear {
     /// m.
-    #[must_use]
     pub fn pitch_radius(&self) -> f64 {
         0.5 * self.module * self.teeth as f64
     }
 
     /// Of the circle whose involutes the flanks are, m.
-    #[must_use]
     pub fn base_radius(&self) -> f64 {
         self.pitch_radius() * self.pressure_angle.cos()
     }
 
     /// The gear, one tooth in the direction of x.
-    #[must_use]
     pub fn mesh(&self) -> RawMesh {
         let outline = self.outline();
         let count = outline.len();
@@ -110,14 +107,12 @@ impl Thread {
     pub const SLOPE: f64 = 1.732_050_807_568_877_2;
 
     /// Height of the ridges, m.
-    #[must_use]
     pub fn depth(&self) -> f64 {
         // 17/24 of the height of the sharp triangle.
         17.0 / 24.0 * 0.5 * Self::SLOPE * self.pitch
     }
 
     /// The bolt, from z = 0 on.
-    #[must_use]
     pub fn bolt(&self, turns: usize) -> RawMesh {
         let (mut raw, rings) = self.ridged(turns, 0.0);
         let facets = self.facets as u32;
@@ -135,7 +130,6 @@ impl Thread {
     }
 
     /// A nut from z = 0 on, whose thread is `clearance` wider, m, and whose outside is a cylinder of `outer_radius`, m.
-    #[must_use]
     pub fn nut(&self, turns: usize, clearance: f64, outer_radius: f64) -> RawMesh {
         let (mut raw, rings) = self.ridged(turns, clearance);
         raw.triangles.iter_mut().for_each(|t| t.swap(1, 2));

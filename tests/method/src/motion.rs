@@ -27,7 +27,6 @@ pub struct Sample {
 }
 
 /// A shipped scene, ready to run; its meshes must be there.
-#[must_use]
 pub fn shipped(name: &str) -> BuiltScene {
     Scene::named_or_file(name)
         .and_then(|scene| scene.build())
@@ -61,13 +60,11 @@ pub struct Led {
 
 impl Led {
     /// At the scene's start.
-    #[must_use]
     pub fn new(scene: &BuiltScene) -> Self {
         Self::in_world(Arc::new(scene.world.clone()), &scene.settings, scene.start)
     }
 
     /// The body of this world, at this start, which must be free.
-    #[must_use]
     pub fn in_world(world: Arc<World>, settings: &Settings, start: Pose) -> Self {
         Self {
             coupling: Coupling::new(&world, settings),
@@ -78,7 +75,6 @@ impl Led {
     }
 
     /// World from body.
-    #[must_use]
     pub fn pose(&self) -> &Pose {
         self.god_object.pose()
     }

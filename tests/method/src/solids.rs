@@ -6,13 +6,11 @@ use nalgebra::Point3;
 use taut_scene::RawMesh;
 
 /// A mesh of a generated shape, which is closed.
-#[must_use]
 pub fn mesh(raw: RawMesh) -> Mesh {
     Mesh::new(raw.vertices, raw.triangles).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A homogeneous body of 1 kg; forces act at its centre of mass.
-#[must_use]
 pub fn body(mesh: Mesh) -> Body {
     let solid = mass_properties(&mesh);
     Body {
@@ -25,7 +23,6 @@ pub fn body(mesh: Mesh) -> Body {
 }
 
 /// An obstacle without surface properties.
-#[must_use]
 pub fn obstacle(name: &str, mesh: Mesh, pose: Pose) -> Obstacle {
     Obstacle {
         primitive: None,
@@ -37,7 +34,6 @@ pub fn obstacle(name: &str, mesh: Mesh, pose: Pose) -> Obstacle {
 }
 
 /// The solid that fills the cells `filled(i, j, k)` of the grid with these planes, m. Filled cells must meet in faces or not at all.
-#[must_use]
 pub fn cells(planes: [&[f64]; 3], filled: impl Fn([usize; 3]) -> bool) -> RawMesh {
     let counts = planes.map(|p| p.len() - 1);
     let is_filled = |cell: [isize; 3]| {

@@ -69,9 +69,8 @@ pub struct Forger {
 
 impl Forger {
     /// A forger whose own key is of the same epoch and sender as the one that it forges.
-    #[must_use]
     pub fn new(seed: u64, epoch: u32, sender: u16) -> Forger {
-        let mut random = Random::new(seed);
+        let mut random = Random(seed);
         let mut material = [0; KEY_MATERIAL_BYTES];
         random.fill(&mut material);
         Forger {
@@ -81,9 +80,6 @@ impl Forger {
     }
 
     /// Makes one into `buffer`; its length. `payload` is what [`Forgery::OtherKey`] seals.
-    ///
-    /// # Panics
-    /// If `seen` has no datagram where the forgery needs one.
     pub fn forge(
         &mut self,
         forgery: Forgery,
@@ -179,10 +175,9 @@ pub struct OneWay {
 
 impl OneWay {
     /// Keys by a seed.
-    #[must_use]
     pub fn new(seed: u64, epoch: u32, sender: u16) -> OneWay {
         let mut material = [0; KEY_MATERIAL_BYTES];
-        Random::new(seed).fill(&mut material);
+        Random(seed).fill(&mut material);
         OneWay {
             sealer: Sealer::new(&material, epoch, sender),
             opener: Opener::new(&material, epoch, sender),
@@ -190,10 +185,6 @@ impl OneWay {
     }
 
     /// The next genuine datagram.
-    ///
-    /// # Panics
-    /// If the payload cannot be sealed.
-    #[must_use]
     pub fn genuine(&self, payload: &Payload) -> Vec<u8> {
         let mut buffer = [0; MAX_DATAGRAM_BYTES];
         let sealed = self.sealer.seal(payload, &mut buffer);
@@ -202,10 +193,6 @@ impl OneWay {
 }
 
 /// A payload of every kind: those of the golden datagrams.
-///
-/// # Panics
-/// If a golden datagram does not open: the wire tests say more.
-#[must_use]
 pub fn payload_of_every_kind() -> Vec<Payload> {
     let material = std::array::from_fn(|i| i as u8);
     let mut opener = Opener::new(&material, 0x0102_0304, 5);
@@ -240,7 +227,6 @@ pub struct Attack {
 }
 
 /// `forgeries` of every sort, kind and direction against the opening of datagrams, with genuine datagrams between them.
-#[must_use]
 pub fn attack(forgeries: u64, seed: u64) -> Attack {
     const EPOCH: u32 = 0x5eed;
     const PER_GENUINE: u64 = 40;

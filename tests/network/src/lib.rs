@@ -12,6 +12,6 @@
 pub mod bench;
 pub mod forge;
 pub mod hostile;
-pub mod random;
-pub mod relay;
 pub mod report;
+
+pub use taut_test_kit::{random, relay};

@@ -201,7 +201,7 @@ mod tests {
     use crate::device::Pose;
     use nalgebra::Point3;
     use std::os::unix::net::UnixDatagram;
-    use std::sync::mpsc::{Receiver, channel};
+    use std::sync::mpsc::{Receiver, Sender, channel};
     use std::time::Instant;
 
     /// Sockets keep the borders of reports, as `/dev/hidraw*` does.
@@ -232,6 +232,27 @@ mod tests {
         }
     }
 
+    fn open(ports: Receiver<UnixDatagram>) -> Result<SpaceMouse, SourceError> {
+        let placement = Placement::plain(Pose::translation(0.0, 0.0, 0.1), Point3::origin());
+        SpaceMouse::open(Box::new(FakePort(ports)), CapSettings::default(), placement)
+    }
+
+    /// A mouse that is there: where later sockets come from, and the other end of the first.
+    fn opened() -> (Sender<UnixDatagram>, UnixDatagram, SpaceMouse) {
+        let (ports, receiver) = channel();
+        let (device, host) = UnixDatagram::pair().expect("sockets");
+        ports.send(host).expect("open");
+        (ports, device, open(receiver).expect("it is there"))
+    }
+
+    /// Reads for so many milliseconds.
+    fn pass(mouse: &mut SpaceMouse, now: &mut Duration, milliseconds: u32) {
+        for _ in 0..milliseconds {
+            *now += Duration::from_millis(1);
+            let _ = mouse.read(*now);
+        }
+    }
+
     /// Reads at growing times of a virtual clock until `done`; only a hang takes a minute.
     fn read_until(
         mouse: &mut SpaceMouse,
@@ -255,19 +276,10 @@ mod tests {
 
     #[test]
     fn reports_move_the_body_until_the_cap_is_let_go_or_the_cable_is_pulled() {
-        let (ports, receiver) = channel();
-        let (device, host) = UnixDatagram::pair().expect("sockets");
-        ports.send(host).expect("open");
-        let start = Pose::translation(0.0, 0.0, 0.1);
-        let placement = Placement::plain(start, Point3::origin());
-        let mut mouse = SpaceMouse::open(
-            Box::new(FakePort(receiver)),
-            CapSettings::default(),
-            placement,
-        )
-        .expect("it is there");
+        let (ports, device, mut mouse) = opened();
         let mut now = Duration::ZERO;
-        assert_eq!(mouse.read(now).expect("open").pose, start);
+        let first = mouse.read(now).expect("open");
+        assert_eq!(first.pose, Pose::translation(0.0, 0.0, 0.1));
 
         // Full to the right, and button 2.
         device.send(b"\x03\x02\0").expect("sent");
@@ -280,10 +292,7 @@ mod tests {
         assert_eq!(moving.buttons, 2);
 
         // Silence is a cap let go: the body stops, and no fault.
-        for _ in 0..1000 {
-            now += Duration::from_millis(1);
-            let _ = mouse.read(now);
-        }
+        pass(&mut mouse, &mut now, 1000);
         let still = mouse.read(now).expect("open");
         assert!(still.velocity.norm() < 1e-6);
         let moved = still.pose.translation.vector.x;
@@ -308,26 +317,14 @@ mod tests {
 
     #[test]
     fn a_button_and_the_battery_revive_no_deflection() {
-        let (ports, receiver) = channel();
-        let (device, host) = UnixDatagram::pair().expect("sockets");
-        ports.send(host).expect("open");
-        let placement = Placement::plain(Pose::translation(0.0, 0.0, 0.1), Point3::origin());
-        let mut mouse = SpaceMouse::open(
-            Box::new(FakePort(receiver)),
-            CapSettings::default(),
-            placement,
-        )
-        .expect("it is there");
+        let (_ports, device, mut mouse) = opened();
         let mut now = Duration::ZERO;
         device.send(b"\x01\x5e\x01\0\0\0\0").expect("sent");
         let _ = read_until(&mut mouse, &mut now, |s| {
             s.as_ref().is_ok_and(|s| s.velocity[0] > 0.0)
         });
         // The cap is let go, but the report that would say so is lost.
-        for _ in 0..1000 {
-            now += Duration::from_millis(1);
-            let _ = mouse.read(now);
-        }
+        pass(&mut mouse, &mut now, 1000);
         let still = mouse.read(now).expect("open").pose;
 
         device.send(b"\x17\x64").expect("sent");
@@ -335,10 +332,7 @@ mod tests {
         let _ = read_until(&mut mouse, &mut now, |s| {
             s.as_ref().is_ok_and(|s| s.buttons == 1)
         });
-        for _ in 0..100 {
-            now += Duration::from_millis(1);
-            let _ = mouse.read(now);
-        }
+        pass(&mut mouse, &mut now, 100);
         let after = mouse.read(now).expect("open").pose;
         let moved = after.translation.vector - still.translation.vector;
         assert!(moved.norm() < 1e-6, "{moved}");
@@ -347,14 +341,6 @@ mod tests {
     #[test]
     fn a_device_that_is_not_there_is_said_at_once() {
         let (_ports, receiver) = channel();
-        let placement = Placement::plain(Pose::identity(), Point3::origin());
-        let error = SpaceMouse::open(
-            Box::new(FakePort(receiver)),
-            CapSettings::default(),
-            placement,
-        )
-        .err()
-        .expect("none");
-        assert_eq!(error, SourceError::NotFound);
+        assert_eq!(open(receiver).err(), Some(SourceError::NotFound));
     }
 }

@@ -238,24 +238,6 @@ impl ClientLink {
         self.hot.group.set_receiver(receiver)
     }
 
-    /// Sends a report, waiting while earlier ones are not away yet.
-    pub async fn send_stats(&self, stats: ClientStats) -> Result<(), LinkError> {
-        let closed = |reason: String| LinkError::Closed {
-            server: self.server.clone(),
-            reason,
-        };
-        if let Some(reason) = self.is_closed() {
-            return Err(closed(reason));
-        }
-        let sent = self.outbox.send(ControlMessage::Stats(stats)).await;
-        sent.map_err(|_| {
-            closed(
-                self.is_closed()
-                    .unwrap_or_else(|| "reports are not taken any more".to_owned()),
-            )
-        })
-    }
-
     /// Sends a report without waiting; `false` if earlier ones are not away yet or the link is closed.
     pub fn post_stats(&self, stats: ClientStats) -> bool {
         self.post(ControlMessage::Stats(stats))

@@ -1,8 +1,7 @@
 //! A small scene, states, and a server on free ports of 127.0.0.1.
 
-pub mod relay;
-
 use std::{
+    net::SocketAddr,
     thread::JoinHandle,
     time::{Duration, Instant},
 };
@@ -16,6 +15,7 @@ use taut_proto::{
     scene::{BodyDescription, NodeDescription, ScreenDescription, Stereo, WindowDescription},
     state::{RunState, ToolState},
 };
+use taut_test_kit::relay::{Direction, Impairment, Relay, Treatment, Waiting};
 use tokio::runtime::Runtime;
 
 /// Only a hang takes this long; every wait ends as soon as its condition holds.
@@ -28,8 +28,14 @@ pub const MAX_ON_THE_WAY: u64 = 50;
 /// Silence that a busy test machine may cause.
 pub const FORGIVING: Duration = Duration::from_secs(4);
 
+/// What there must be, or the test ends with the reason.
+#[track_caller]
+pub fn must<T, E: std::fmt::Display>(result: Result<T, E>) -> T {
+    result.unwrap_or_else(|error| panic!("{error}"))
+}
+
 pub fn key(digit: char) -> ClusterKey {
-    ClusterKey::parse(&digit.to_string().repeat(64)).unwrap_or_else(|error| panic!("{error}"))
+    must(ClusterKey::parse(&digit.to_string().repeat(64)))
 }
 
 /// A strip of `count` triangles.
@@ -38,8 +44,7 @@ pub fn strip(count: u32) -> MeshBlob {
         .map(|i| [f64::from(i) * 1e-3, f64::from(i % 2) * 1e-3, 0.0])
         .collect();
     let triangles = (0..count).map(|i| [i, i + 1, i + 2]).collect();
-    MeshBlob::new(Positions::F64(positions), triangles, None)
-        .unwrap_or_else(|error| panic!("{error}"))
+    must(MeshBlob::new(Positions::F64(positions), triangles, None))
 }
 
 pub fn hash_of(mesh: &MeshBlob) -> MeshHash {
@@ -98,9 +103,7 @@ pub async fn server() -> ServerLink {
 }
 
 pub async fn server_with(options: ServerOptions) -> ServerLink {
-    serve(options, content())
-        .await
-        .unwrap_or_else(|error| panic!("{error}"))
+    must(serve(options, content()).await)
 }
 
 pub fn options(server: &ServerLink, role: Role, node: &str) -> ClientOptions {
@@ -113,9 +116,7 @@ pub fn options(server: &ServerLink, role: Role, node: &str) -> ClientOptions {
 }
 
 pub async fn client(server: &ServerLink, role: Role, node: &str) -> ClientLink {
-    taut_link::connect(options(server, role, node))
-        .await
-        .unwrap_or_else(|error| panic!("{error}"))
+    must(taut_link::connect(options(server, role, node)).await)
 }
 
 /// State of `tick`, 1 kHz, whose numbers tell the tick.
@@ -155,22 +156,34 @@ pub fn input(index: u64) -> InputSample {
     }
 }
 
+/// The clients' side of a relay, before the server's port is known.
+pub fn relay_port() -> Waiting {
+    must(Waiting::bind())
+}
+
+/// A relay that treats every client so, both ways.
+pub fn start_relay(port: Waiting, server: SocketAddr, impairment: Impairment, seed: u64) -> Relay {
+    must(port.start(server, vec![Treatment::both_ways(impairment)], seed))
+}
+
 /// A server whose hot plane is behind a relay.
-pub async fn behind_relay(
-    impairment: relay::Impairment,
-    seed: u64,
-    options: impl FnOnce(ServerOptions) -> ServerOptions,
-) -> (ServerLink, relay::Relay) {
-    let waiting = relay::Waiting::new();
-    let server = server_with(options(ServerOptions {
-        announced_udp_port: Some(waiting.port()),
+pub async fn behind_relay(impairment: Impairment, seed: u64) -> (ServerLink, Relay) {
+    let port = relay_port();
+    let server = server_with(ServerOptions {
+        announced_udp_port: Some(port.address().port()),
         idle_timeout: FORGIVING,
         node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
-    }))
+    })
     .await;
-    let relay = waiting.start(server.udp_addr(), impairment, seed);
+    let relay = start_relay(port, server.udp_addr(), impairment, seed);
     (server, relay)
+}
+
+/// The server's datagrams that did not arrive as they were sent.
+pub fn lost_down(relay: &Relay) -> u64 {
+    let counts = relay.counts(Direction::Down);
+    counts.all_lost() + counts.flipped
 }
 
 /// Sends states of growing tick until `done`, one per millisecond; gives up after [`PATIENCE`]. Returns the next tick.
@@ -191,6 +204,23 @@ pub async fn broadcast_until(
         tokio::time::sleep(Duration::from_millis(1)).await;
     }
     tick
+}
+
+/// Sends states until `client` has `count` of them; the next tick.
+pub async fn take_states(
+    server: &ServerLink,
+    client: &ClientLink,
+    first: u64,
+    count: usize,
+) -> u64 {
+    let mut states = Vec::new();
+    let next = broadcast_until(&mut server.broadcaster(), first, || {
+        client.drain_states(&mut states);
+        states.len() >= count
+    })
+    .await;
+    assert_in_order(&states);
+    next
 }
 
 /// As [`broadcast_until`], but a state is sent only while fewer than [`MAX_ON_THE_WAY`] states are neither in `settled` nor lost on purpose.
@@ -268,16 +298,18 @@ pub async fn error_of(options: ClientOptions) -> LinkError {
 
 /// A runtime that a test can end before the others.
 pub fn runtime() -> Runtime {
-    tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .unwrap_or_else(|error| panic!("{error}"))
+    must(
+        tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build(),
+    )
 }
 
 pub fn thread(name: &str, body: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
-    std::thread::Builder::new()
-        .name(name.to_owned())
-        .spawn(body)
-        .unwrap_or_else(|error| panic!("{error}"))
+    must(
+        std::thread::Builder::new()
+            .name(name.to_owned())
+            .spawn(body),
+    )
 }

@@ -10,20 +10,20 @@ const STOP_SHARE_OF_TOLERANCE: f64 = 0.5;
 
 /// Distances that a search keeps, m.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Gaps {
+pub(crate) struct Gaps {
     /// The gap that nothing may go below, m.
-    pub(super) minimum: f64,
+    pub(crate) minimum: f64,
     /// The gap at which an advance ends, m: above the minimum.
-    pub(super) stop: f64,
+    pub(crate) stop: f64,
     /// What is this far above `stop` is at it, m.
-    pub(super) tolerance: f64,
+    pub(crate) tolerance: f64,
     /// Bound on the rounding error of a distance, m.
-    pub(super) slack: f64,
+    pub(crate) slack: f64,
 }
 
 impl Gaps {
     /// An advance ends at most `tolerance` above `minimum`; `slack` is added for rounding.
-    pub(super) fn new(minimum: f64, tolerance: f64, slack: f64) -> Self {
+    pub(crate) fn new(minimum: f64, tolerance: f64, slack: f64) -> Self {
         Self {
             minimum,
             stop: minimum + slack + STOP_SHARE_OF_TOLERANCE * tolerance,
@@ -33,7 +33,7 @@ impl Gaps {
     }
 
     /// For bodies whose distance at the start is `gap`, nearer than the gap to stop at; `None` when nothing is left to keep.
-    pub(super) fn keeping(&self, gap: f64) -> Option<Self> {
+    pub(crate) fn keeping(&self, gap: f64) -> Option<Self> {
         let above = gap - KEPT_SLACKS * self.slack;
         let kept = if above >= self.minimum {
             above

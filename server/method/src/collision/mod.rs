@@ -44,5 +44,6 @@ pub(crate) use descent::for_facing_triangle_pairs;
 pub(crate) use displacements::{MAX_MOTIONS, Motions};
 pub(crate) use facing_volumes::{FacingVolumes, Side};
 pub(crate) use fall::time_to_fall;
+pub(crate) use gaps::Gaps;
 pub(crate) use motion::{Placement, RelativeMotion};
 pub(crate) use workspace::{MAX_CANDIDATES, MAX_WITNESSES};

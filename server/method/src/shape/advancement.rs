@@ -20,14 +20,8 @@ use nalgebra::Vector3;
 
 use super::closest;
 use super::piece::Piece;
-use crate::collision::{Placement, RelativeMotion, Work, time_to_fall};
+use crate::collision::{Gaps, Placement, RelativeMotion, Work, time_to_fall};
 
-/// Bodies nearer than the minimum gap at the start may come down to this share of their distance there.
-const KEPT_SHARE_OF_START_GAP: f64 = 0.9;
-/// Bodies at the minimum gap to rounding may lose this many units of slack.
-const KEPT_SLACKS: f64 = 4.0;
-/// Share of the gap tolerance, above the minimum gap, at which an advance ends.
-const STOP_SHARE_OF_TOLERANCE: f64 = 0.5;
 /// A step along the normals of faces and caps that covers this share of what is left is taken without a look at closest points.
 const GOOD_SHARE: f64 = 0.25;
 /// A cylinder's axis nearer to the direction than this stands, as a sine: the first bound divides by it.
@@ -59,55 +53,11 @@ pub(super) enum Still {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Search<'a> {
     pub(super) motion: &'a RelativeMotion,
-    /// The gap that no pair may go below, m.
-    pub(super) minimum_gap: f64,
-    /// The gap at which an advance ends, m: above the minimum gap.
-    pub(super) stop_gap: f64,
-    /// A pair this far above `stop_gap` is at it, m.
-    pub(super) stop_tolerance: f64,
-    /// Bound on the rounding error of a distance, m.
-    pub(super) slack: f64,
+    pub(super) gaps: Gaps,
     pub(super) max_iterations: u32,
 }
 
-impl<'a> Search<'a> {
-    /// A search that stops at most `gap_tolerance` above `minimum_gap`; `slack` is added for rounding.
-    pub(super) fn new(
-        motion: &'a RelativeMotion,
-        minimum_gap: f64,
-        gap_tolerance: f64,
-        slack: f64,
-        max_iterations: u32,
-    ) -> Self {
-        Self {
-            motion,
-            minimum_gap,
-            stop_gap: minimum_gap + slack + STOP_SHARE_OF_TOLERANCE * gap_tolerance,
-            stop_tolerance: (1.0 - STOP_SHARE_OF_TOLERANCE) * gap_tolerance,
-            slack,
-            max_iterations,
-        }
-    }
-
-    /// The same search for bodies whose distance at the start is `gap`, nearer than the gap to stop at; `None` when nothing is left to keep.
-    pub(super) fn keeping(&self, gap: f64) -> Option<Self> {
-        let above = gap - KEPT_SLACKS * self.slack;
-        let kept = if above >= self.minimum_gap {
-            above
-        } else {
-            KEPT_SHARE_OF_START_GAP * gap
-        };
-        let stop_gap = kept.min(self.stop_gap);
-        let stop_tolerance = self
-            .stop_tolerance
-            .min(STOP_SHARE_OF_TOLERANCE * (gap - stop_gap));
-        (kept > self.slack).then_some(Self {
-            stop_gap,
-            stop_tolerance,
-            ..*self
-        }) // None for NaN
-    }
-
+impl Search<'_> {
     /// Follows the pair over `[from, to]`; `placement` is the body at `from`, `mover` its piece in its own frame.
     pub(super) fn advance(
         &self,
@@ -120,28 +70,28 @@ impl<'a> Search<'a> {
     ) -> Outcome {
         let mut moving = Moving::at(self.motion, placement, mover, to - from);
         // The directions that cost nothing settle most pairs.
-        if moving.cheap_step(still, self.stop_gap).step >= to - from {
+        if moving.cheap_step(still, self.gaps.stop).step >= to - from {
             return Outcome::Free;
         }
         let mut time = from;
         for iteration in 0..self.max_iterations {
             work.advancement_steps += 1;
-            let cheap = moving.cheap_step(still, self.stop_gap);
+            let cheap = moving.cheap_step(still, self.gaps.stop);
             let good = cheap.step >= GOOD_SHARE * (to - time)
-                && cheap.gap - self.stop_gap > self.stop_tolerance; // false for NaN
+                && cheap.gap - self.gaps.stop > self.gaps.tolerance; // false for NaN
             let best = if good {
                 cheap
             } else {
-                moving.best_step(still, cheap, self.stop_gap)
+                moving.best_step(still, cheap, self.gaps.stop)
             };
-            let far = best.gap >= self.stop_gap; // false for NaN
+            let far = best.gap >= self.gaps.stop; // false for NaN
             if iteration == 0 && !far {
                 return Outcome::Near(best.gap);
             }
             if best.step >= to - time {
                 return Outcome::Free;
             }
-            let apart = best.gap - self.stop_gap > self.stop_tolerance; // false for NaN
+            let apart = best.gap - self.gaps.stop > self.gaps.tolerance; // false for NaN
             time += best.step.max(0.0);
             if !apart {
                 return Outcome::Hit(time);

@@ -8,7 +8,7 @@ use super::advancement::{Outcome, Search, Still};
 use super::bound::{Bound, for_triangles};
 use super::piece::Piece;
 use crate::collision::{
-    AdvancementSettings, CollisionWorkspace, Motion, RelativeMotion, TimeOfImpact, Work,
+    AdvancementSettings, CollisionWorkspace, Gaps, Motion, RelativeMotion, TimeOfImpact, Work,
 };
 use crate::geometry::Mesh;
 use crate::spatial::Pose;
@@ -75,13 +75,11 @@ pub(super) fn time_of_impact(
     let world_reach =
         motion.start.translation.vector.amax() + obstacle_pose.translation.vector.amax();
     let slack = ROUNDING * (relative.reach(radius) + obstacle.reach() + world_reach);
-    let search = Search::new(
-        &relative,
-        settings.minimum_gap,
-        settings.gap_tolerance,
-        slack,
-        settings.max_iterations,
-    );
+    let search = Search {
+        motion: &relative,
+        gaps: Gaps::new(settings.minimum_gap, settings.gap_tolerance, slack),
+        max_iterations: settings.max_iterations,
+    };
     let problem = Problem {
         body,
         obstacle,
@@ -96,7 +94,12 @@ pub(super) fn time_of_impact(
             Ok(answer) => return answer,
             // Nearer than the gap to stop at already: keep what there is, so that sliding and leaving stay free.
             Err(gap) if gap < -slack => return TimeOfImpact::Overlapping,
-            Err(gap) => tried = search.keeping(gap),
+            Err(gap) => {
+                tried = search
+                    .gaps
+                    .keeping(gap)
+                    .map(|gaps| Search { gaps, ..search });
+            }
         }
     }
     TimeOfImpact::Impact { time: 0.0 }
@@ -178,7 +181,7 @@ impl Problem<'_> {
                 first.take(search.advance(&mover, &still, &placement, from, to, work));
             }
             (Form::Primitive(mover), Form::Mesh(mesh)) => {
-                let bound = Bound::over(mover, false, self.relative, [from, to], search.stop_gap);
+                let bound = Bound::over(mover, false, self.relative, [from, to], search.gaps.stop);
                 let Some(mover) = Piece::of(mover) else {
                     return first.take(Outcome::Hit(0.0));
                 };
@@ -189,7 +192,8 @@ impl Problem<'_> {
                 });
             }
             (Form::Mesh(mesh), Form::Primitive(obstacle)) => {
-                let bound = Bound::over(obstacle, true, self.relative, [from, to], search.stop_gap);
+                let bound =
+                    Bound::over(obstacle, true, self.relative, [from, to], search.gaps.stop);
                 let Some(still) = still_of(obstacle) else {
                     return first.take(Outcome::Hit(0.0));
                 };

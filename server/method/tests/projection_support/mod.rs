@@ -3,57 +3,7 @@
 use god_object::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind};
 use god_object::spatial::{Vector6, six};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-
-/// A small deterministic generator (SplitMix64): the same problems on every machine.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in [-1, 1).
-    pub(crate) fn signed(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    /// Uniform in [0, 1).
-    pub(crate) fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    pub(crate) fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-
-    pub(crate) fn vector3(&mut self) -> Vector3<f64> {
-        Vector3::new(self.signed(), self.signed(), self.signed())
-    }
-
-    pub(crate) fn vector6(&mut self) -> Vector6 {
-        Vector6::from_fn(|_, _| self.signed())
-    }
-
-    pub(crate) fn direction(&mut self) -> Vector3<f64> {
-        loop {
-            let v = self.vector3();
-            let norm = v.norm();
-            if norm > 0.1 && norm < 1.0 {
-                return v / norm;
-            }
-        }
-    }
-
-    pub(crate) fn shuffle<T>(&mut self, items: &mut [T]) {
-        for i in (1..items.len()).rev() {
-            items.swap(i, self.below(i + 1));
-        }
-    }
-}
+pub(crate) use taut_test_kit::random::Random;
 
 /// The metric of a 1 kg body of about 0.1 m.
 pub(crate) fn hand_sized_metric() -> Metric {

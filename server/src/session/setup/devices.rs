@@ -6,8 +6,8 @@ use god_object::nalgebra::{Point3, Similarity3, UnitQuaternion};
 use god_object::spatial::Pose;
 use taut_bridge::{
     AtEnd, Device, DeviceLimits, Grip, Hand, HeldStrings, InputChoice, MinJerkPath, Placement,
-    RecordedDevice, SimulatedDevice, SpidarDevice, TraceRow, Tremor, ViaPoint, simulated_spidar,
-    string_geometry,
+    RecordedDevice, SimulatedDevice, SpidarDevice, Tremor, simulated_spidar, string_geometry,
+    via_points,
 };
 use taut_scene::{BuiltScene, DeviceTrace, HandPreset};
 
@@ -106,7 +106,7 @@ fn hand_and_intention(
         (None, None) => (None, true, String::new()),
     };
     let intention = match trace {
-        Some(trace) => MinJerkPath::new(via_points(&trace), repeat)
+        Some(trace) => MinJerkPath::new(via_points(trace.samples()), repeat)
             .map_err(|error| Failure::BadInput(format!("{named}: {error}")))?,
         None => MinJerkPath::sway(scene.start, SWAY.0, SWAY.1),
     };
@@ -156,21 +156,7 @@ fn recorded(
     reference_point: &Point3<f64>,
 ) -> Result<RecordedDevice, Failure> {
     let trace = DeviceTrace::load(path)?;
-    let rows = trace.samples().iter().map(|sample| TraceRow {
-        time_s: sample.time,
-        pose: sample.pose,
-        buttons: sample.buttons,
-    });
     let at_end = if repeat { AtEnd::Loop } else { AtEnd::Hold };
-    RecordedDevice::new(rows.collect(), at_end, *reference_point)
+    RecordedDevice::new(trace.samples().to_vec(), at_end, *reference_point)
         .map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))
-}
-
-fn via_points(trace: &DeviceTrace) -> Vec<ViaPoint> {
-    let start = trace.samples().first().map_or(0.0, |first| first.time);
-    let point = |sample: &taut_scene::TraceSample| ViaPoint {
-        time_s: sample.time - start,
-        pose: sample.pose,
-    };
-    trace.samples().iter().map(point).collect()
 }

@@ -43,7 +43,6 @@ const EXPECTED: [(f64, f64, f64); 4] = [
 ];
 
 /// Force from peak to peak, N, over the ticks that are watched, one pair after the other.
-#[must_use]
 pub fn peak_to_peak<const N: usize>(
     stiffness: f64,
     coulomb: f64,

@@ -52,7 +52,6 @@ pub struct Case {
 
 impl Case {
     /// K_crit of the sampled loop by its eigenvalues, N/m.
-    #[must_use]
     pub fn by_eigenvalues(&self) -> f64 {
         let device = grip(self.damping);
         SampledLoop {
@@ -67,7 +66,6 @@ impl Case {
     }
 
     /// K_crit by simulation with the real coupling, N/m.
-    #[must_use]
     pub fn by_simulation(&self) -> f64 {
         critical(|stiffness| self.grows(stiffness))
     }

@@ -10,10 +10,6 @@ use super::sweep::{BUDGET, Measured, Swept, sweep};
 use super::{held_out, scenes};
 
 /// Runs every scene. Exit code 1 where a choice is over the budget although some setting is within it.
-///
-/// # Errors
-///
-/// Where an option is unknown, a file cannot be written or a scene is wrong.
 pub fn run(arguments: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn Error>> {
     let (mut quick, mut directory) = (false, PathBuf::from("target/lab"));
     let mut held_out = None;
@@ -79,7 +75,6 @@ fn run_held_out(what: &HeldOut, files: &Path, quick: bool) -> Result<ExitCode, B
 }
 
 /// The choice of each scene beside the cheapest setting within the budget.
-#[must_use]
 pub fn table(swept: &[Swept]) -> String {
     let mut text = format!(
         "{:<17} {:>7} {:>9} {:>6} {:>9} {:>11} {:>10} {:>9} {:>10} {:>6}  budget J <= {BUDGET}\n",
@@ -123,7 +118,6 @@ pub fn table(swept: &[Swept]) -> String {
 }
 
 /// CSV of the choices within a time: what was predicted and measured of them, and the least error of any setting that fast.
-#[must_use]
 pub fn within_times(swept: &[Swept]) -> String {
     let mut text =
         "scene,time_us,rate_hz,rounds,predicted_us,measured_us,predicted_j,j,least_j_that_fast\n"
@@ -164,7 +158,6 @@ fn fields(m: &Measured) -> String {
 }
 
 /// CSV of every setting.
-#[must_use]
 pub fn every_setting(swept: &[Swept]) -> String {
     let mut text = "scene,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,j_direction,j_magnitude,j_torque,j_step,cost_us_per_s\n".to_owned();
     for s in swept {
@@ -176,7 +169,6 @@ pub fn every_setting(swept: &[Swept]) -> String {
 }
 
 /// CSV of the choices.
-#[must_use]
 pub fn choices(swept: &[Swept]) -> String {
     let mut text =
         "scene,chosen_by,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,j_direction,j_magnitude,j_torque,j_step,cost_us_per_s,predicted_j\n"

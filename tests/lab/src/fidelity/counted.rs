@@ -21,10 +21,6 @@ pub struct Counted {
 }
 
 impl Counted {
-    /// # Panics
-    ///
-    /// Where the start is not free: scenes are checked when they are built.
-    #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let simulation = GodObject::new(scene.world.clone(), scene.settings, scene.start)
             .unwrap_or_else(|error| panic!("{error}"));

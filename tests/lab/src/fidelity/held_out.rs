@@ -63,10 +63,6 @@ fn around(radius: f64, depth: f64, speed: f64) -> impl Fn(f64) -> Pose + Send + 
 }
 
 /// All of them; their files are written into `directory`.
-///
-/// # Errors
-///
-/// Where a file cannot be written.
 pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
     let mut egg = shapes::sphere(0.03, 5);
     for vertex in &mut egg.vertices {
@@ -262,10 +258,6 @@ fn turning() -> Vec<FidelityScene> {
 }
 
 /// What the scenes choose and foretell, from their files alone: the CSV that is committed before anything is run.
-///
-/// # Errors
-///
-/// Where a scene file is wrong.
 pub fn predictions(scenes: &[FidelityScene], directory: &Path) -> Result<String, SceneError> {
     let mut csv = COLUMNS.to_owned();
     for scene in scenes {
@@ -280,7 +272,6 @@ pub fn predictions(scenes: &[FidelityScene], directory: &Path) -> Result<String,
 }
 
 /// The verdict on what was committed: a table of Markdown, and how many choices are within the budget or have no setting that is.
-#[must_use]
 pub fn verdict(swept: &[Swept]) -> (String, usize) {
     let mut text = "| scene | rate, Hz | rounds | J predicted | J measured | cost over the least within the budget | verdict |\n| --- | --- | --- | --- | --- | --- | --- |\n".to_owned();
     let mut kept = 0;

@@ -59,10 +59,6 @@ pub struct FidelityScene {
 }
 
 /// All of them; their mesh files and traces are written into `directory`.
-///
-/// # Errors
-///
-/// Where a file cannot be written.
 pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
     let ball = shapes::sphere(MESH_BALL, 5);
     fs::write(directory.join("ball.ply"), taut_scene::write_ply(&ball))?;

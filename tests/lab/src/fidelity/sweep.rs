@@ -76,7 +76,6 @@ pub struct Swept {
 
 impl Measured {
     /// Nominal time of an update, us.
-    #[must_use]
     pub fn update_us(&self) -> f64 {
         self.cost / self.setting.rate
     }
@@ -84,27 +83,23 @@ impl Measured {
 
 impl Swept {
     /// The cheapest within the budget, if any is.
-    #[must_use]
     pub fn cheapest(&self) -> Option<&Measured> {
         let within = self.all.iter().filter(|measured| measured.j <= BUDGET);
         within.min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     /// The least error of all settings.
-    #[must_use]
     pub fn least_error(&self) -> f64 {
         self.all.iter().map(|m| m.j).fold(f64::INFINITY, f64::min)
     }
 
     /// The least error of the settings whose updates take no more than a time, us; infinite where none is so fast.
-    #[must_use]
     pub fn least_error_within(&self, time_us: f64) -> f64 {
         let fast = self.all.iter().filter(|m| m.update_us() <= time_us);
         fast.map(|m| m.j).fold(f64::INFINITY, f64::min)
     }
 
     /// Cost of the choice over the cheapest that is within the budget.
-    #[must_use]
     pub fn ratio(&self) -> Option<f64> {
         self.cheapest().map(|best| self.auto.cost / best.cost)
     }
@@ -117,10 +112,6 @@ impl Swept {
 }
 
 /// What the scene chooses, from its file alone.
-///
-/// # Errors
-///
-/// Where a scene file is wrong.
 pub fn choice(scene: &FidelityScene, directory: &Path) -> Result<(Setting, f64), SceneError> {
     let plain = scene.text.replace("{simplify}", "");
     let chosen = SceneFile::parse("fidelity.toml", &plain, directory)?.build()?;
@@ -130,10 +121,6 @@ pub fn choice(scene: &FidelityScene, directory: &Path) -> Result<(Setting, f64),
 }
 
 /// Builds, runs and measures. `quick` takes every other rate and the ends of the other lists.
-///
-/// # Errors
-///
-/// Where a scene file is wrong.
 pub fn sweep(scene: &FidelityScene, directory: &Path, quick: bool) -> Result<Swept, SceneError> {
     let plain = scene.text.replace("{simplify}", "");
     let parsed = SceneFile::parse("fidelity.toml", &plain, directory)?;

@@ -167,7 +167,6 @@ impl Conditions {
     }
 
     /// Of the sampled loop of device and spring, N/m.
-    #[must_use]
     pub fn by_eigenvalues(&self) -> f64 {
         let loop_of_it = SampledLoop {
             mass: self.device().mass,
@@ -179,7 +178,6 @@ impl Conditions {
     }
 
     /// `b / (T/2 + t_d)`, N/m.
-    #[must_use]
     pub fn by_rule(&self) -> f64 {
         linear_limit(self.damping, 0.0, PERIOD.as_secs_f64(), self.delay)
     }
@@ -194,7 +192,6 @@ impl Conditions {
     }
 
     /// K_crit of a method, N/m.
-    #[must_use]
     pub fn critical(&self, method: Method) -> f64 {
         let [mut calm, mut wild] = SEARCH;
         while wild / calm > 1.0 + SEARCH_WIDTH {

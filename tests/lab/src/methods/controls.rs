@@ -20,7 +20,6 @@ pub struct Control {
 
 impl Control {
     /// Never moves, and gives no force.
-    #[must_use]
     pub fn does_nothing(scene: &Scene) -> Self {
         Self {
             pose: scene.start,
@@ -29,7 +28,6 @@ impl Control {
     }
 
     /// Never moves, and gives another force and torque every millisecond, the same in every run.
-    #[must_use]
     pub fn random_force(scene: &Scene) -> Self {
         Self {
             pose: scene.start,

@@ -38,7 +38,6 @@ pub struct Discrete {
 
 impl Discrete {
     /// At the scene's start, with these settings but for the adaptation of constraints.
-    #[must_use]
     pub fn new(scene: &Scene, settings: &Settings) -> Self {
         let settings = Settings {
             adaptation: None,

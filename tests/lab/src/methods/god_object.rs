@@ -17,10 +17,6 @@ pub struct GodObjectMethod {
 }
 
 impl GodObjectMethod {
-    /// # Panics
-    ///
-    /// Where the start is not free.
-    #[must_use]
     pub fn new(scene: &Scene, settings: &Settings) -> Self {
         let simulation = GodObject::new(scene.world.clone(), *settings, scene.start)
             .unwrap_or_else(|error| panic!("{error}"));

@@ -31,7 +31,6 @@ pub struct Penalty {
 
 impl Penalty {
     /// At the scene's start. `spacing`: between points, over the body's longest side; infinite: its vertices alone.
-    #[must_use]
     pub fn new(scene: &Scene, shell_force: ShellForce, spacing: f64) -> Self {
         let mesh = &scene.world.body.mesh;
         let [low, high] = mesh.bounding_box();

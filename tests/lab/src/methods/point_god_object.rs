@@ -50,11 +50,6 @@ pub struct PointGodObject {
 
 impl PointGodObject {
     /// At the scene's start. Faces within `touch` rest distances count as touched.
-    ///
-    /// # Panics
-    ///
-    /// Never: the metric is that of 1 kg.
-    #[must_use]
     pub fn new(scene: &Scene, touch: f64) -> Self {
         let settings = scene.settings;
         let held = Held {

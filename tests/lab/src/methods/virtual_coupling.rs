@@ -56,7 +56,6 @@ pub struct VirtualCoupling {
 impl VirtualCoupling {
     /// At the scene's start, updated every `period` seconds. `share`: inertia of the proxy over that of the body; `damping_ratio`: damping
     /// over critical damping.
-    #[must_use]
     pub fn new(scene: &Scene, period: f64, share: f64, damping_ratio: f64) -> Self {
         let settings = scene.settings;
         let stiffness = settings.k_h * settings.k_s;

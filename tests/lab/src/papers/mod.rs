@@ -67,11 +67,6 @@ const NOT_ESTABLISHED: [(&str, &str); 3] = [
 ];
 
 /// Every figure.
-///
-/// # Panics
-///
-/// Where a recipe that is named is not there: they are made in code.
-#[must_use]
 pub fn figures() -> Vec<Figure> {
     let recipes = all(Extent::Quick);
     let recipe = |name: &str, case: &str| -> &Recipe {
@@ -92,7 +87,6 @@ pub fn figures() -> Vec<Figure> {
 }
 
 /// As a table of Markdown.
-#[must_use]
 pub fn table(figures: &[Figure]) -> String {
     let mut table = String::from(
         "| method | figure of its own paper | published | here | reached |\n| --- | --- | --- | --- | --- |\n",

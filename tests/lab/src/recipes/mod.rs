@@ -57,7 +57,6 @@ impl Extent {
 }
 
 /// Every recipe, case by case.
-#[must_use]
 pub fn all(extent: Extent) -> Vec<Recipe> {
     [
         free_space::recipes,

@@ -132,7 +132,6 @@ pub(crate) fn panels(sweep: &Sweep, points: &[Point]) -> Vec<(Frame, Vec<Mark>)>
 }
 
 /// Points as CSV. What may differ between runs stands in the last two columns: the cost where it is a time, and the front that follows from it.
-#[must_use]
 pub fn csv(sweep: &Sweep, points: &[Point]) -> String {
     let mut text = String::from("sweep,recipe,case,setting,rate_hz,error,unit");
     for measure in SHOWN {

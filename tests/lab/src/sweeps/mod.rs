@@ -151,7 +151,6 @@ pub(crate) const SHOWN: [Measure; 7] = [
 
 impl Sweep {
     /// How many steps of progress it is, in an extent.
-    #[must_use]
     pub fn count(&self, extent: Extent) -> usize {
         match self.runs {
             Runs::Settings(recipes, variants) => recipes.len() * variants().len(),
@@ -161,10 +160,6 @@ impl Sweep {
     }
 
     /// All its points, made on so many threads; calls `done` after each run.
-    ///
-    /// # Panics
-    ///
-    /// Where a recipe that it names is not there: both are made in code.
     pub fn run(
         &self,
         extent: Extent,

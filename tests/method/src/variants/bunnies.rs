@@ -53,7 +53,6 @@ pub const SLIDES: [Slide; 3] = [
 ];
 
 /// A bunny of the test data; `None` where it is not there.
-#[must_use]
 pub fn load(name: &str) -> Option<Mesh> {
     let raw = read_mesh(&data_file(name)?).ok()?;
     Mesh::new(raw.vertices, raw.triangles).ok()
@@ -61,7 +60,6 @@ pub fn load(name: &str) -> Option<Mesh> {
 
 impl Slide {
     /// Two of these bunnies, as dense as the slide asks for.
-    #[must_use]
     pub fn world(&self, bunny: &Mesh) -> Arc<World> {
         let soup = (bunny.vertices().to_vec(), bunny.triangles().to_vec());
         let (vertices, triangles) = subdivided(&soup, self.subdivisions);
@@ -73,7 +71,6 @@ impl Slide {
     }
 
     /// Time of each update in contact, in the unit of `clock`.
-    #[must_use]
     pub fn times(&self, world: &Arc<World>, clock: impl Fn() -> f64) -> Vec<f64> {
         let mut times = Vec::new();
         self.lead(world, |k, god_object, device| {
@@ -87,7 +84,6 @@ impl Slide {
     }
 
     /// How far every fifth set is from what all pairs say, for the device one step on; see [`Difference`](super::oracle::Difference).
-    #[must_use]
     pub fn errors(&self, world: &Arc<World>) -> Vec<f64> {
         let mut oracle = Oracle::default();
         let mut errors = Vec::new();
@@ -106,7 +102,7 @@ impl Slide {
         let settings = Settings::for_size(SIZE);
         let mut god_object =
             GodObject::new(Arc::clone(world), settings, start).expect("apart at the start");
-        let mut hand = SlidingHand::with_steps(start, 1, self.step);
+        let mut hand = SlidingHand::new(start, 1, self.step);
         for k in 0..APPROACH + self.updates {
             let device = hand.next(god_object.pose());
             step(k, &mut god_object, &device);

@@ -6,7 +6,6 @@
 use crate::hand::Random;
 
 /// Rows of level indices, one for each factor; `levels[f]` is how many the factor f has.
-#[must_use]
 pub fn pairwise(levels: &[usize], seed: u64) -> Vec<Vec<usize>> {
     let mut random = Random(seed);
     let mut open: Vec<[(usize, usize); 2]> = Vec::new();

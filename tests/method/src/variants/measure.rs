@@ -49,7 +49,6 @@ pub struct Outcome {
 }
 
 /// The value below which the share of the sorted `values` lies.
-#[must_use]
 pub fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -61,7 +60,6 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
 }
 
 /// Runs a variant; times are differences of `clock`.
-#[must_use]
 pub fn run(
     variant: &Variant,
     course: &Course,

@@ -96,7 +96,6 @@ pub struct Variant {
 }
 
 /// The peg of the method's table of targets: 26,208 triangles in a hole of 26,784, pushed to the side and down onto an end stop.
-#[must_use]
 pub fn dense_peg(name: &str) -> Variant {
     let cut = Tessellation {
         facets: 144,
@@ -120,7 +119,6 @@ pub fn dense_peg(name: &str) -> Variant {
 }
 
 /// The cases that have names of their own.
-#[must_use]
 pub fn named() -> Vec<Variant> {
     let long = Tessellation {
         facets: 72,
@@ -185,7 +183,6 @@ pub fn named() -> Vec<Variant> {
 }
 
 /// Variants in which every two levels of two factors meet; with at most about `triangles` triangles a side.
-#[must_use]
 pub fn covering(triangles: u32, seed: u64) -> Vec<Variant> {
     let fits = [
         Fit::PegInHole,

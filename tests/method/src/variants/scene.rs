@@ -51,7 +51,6 @@ pub struct VariantScene {
 
 impl VariantScene {
     /// Makes the meshes.
-    #[must_use]
     pub fn new(variant: &Variant) -> Self {
         let mut random = Random(variant.seed);
         let place = Vector3::from_fn(|_, _| random.unit() - 0.5);
@@ -134,7 +133,6 @@ impl VariantScene {
     }
 
     /// Where the obstacle that moves is to be at `time`, s: its index and world from obstacle.
-    #[must_use]
     pub fn moved(&self, time: f64) -> Option<(usize, Pose)> {
         self.moved.map(|(index, rest)| {
             let along = self.frame.rotation * Vector3::x();
@@ -147,7 +145,6 @@ impl VariantScene {
     }
 
     /// World from device at `time`, s.
-    #[must_use]
     pub fn device(&self, time: f64) -> Pose {
         let (moved, turned) = match self.fit {
             Fit::PegInHole | Fit::ShaftInBore => in_hole(self.motion, time),

@@ -18,7 +18,6 @@ pub struct Tessellation {
 }
 
 /// A shaft about the z axis whose corners lie on its radius; crowned by `crown` (m) in the middle of its length.
-#[must_use]
 pub fn shaft(radius: f64, half: f64, cut: Tessellation, crown: f64) -> RawMesh {
     let profile: Vec<[f64; 2]> = (0..=cut.bands)
         .map(|k| {
@@ -44,7 +43,6 @@ pub fn shaft(radius: f64, half: f64, cut: Tessellation, crown: f64) -> RawMesh {
 }
 
 /// A ring-shaped block whose bore leaves a shaft of `radius` this clearance (m) whatever the facets, `turn` facets turned about z.
-#[must_use]
 pub fn bore(radius: f64, clearance: f64, half: f64, cut: Tessellation, turn: f64) -> RawMesh {
     let inner = (radius + clearance) / (PI / f64::from(cut.facets)).cos();
     let outer = 3.0 * radius;
@@ -62,7 +60,6 @@ pub fn bore(radius: f64, clearance: f64, half: f64, cut: Tessellation, turn: f64
 }
 
 /// A plate with its underside at z = 0 and the given half sides, its underside crowned by `crown` (m): the middle stands out.
-#[must_use]
 pub fn plate(half: [f64; 3], cut: Tessellation, crown: f64) -> RawMesh {
     let across = (cut.facets / 12).max(1);
     let planes = |half: f64, count: u32| -> Vec<f64> {
@@ -80,7 +77,6 @@ pub fn plate(half: [f64; 3], cut: Tessellation, crown: f64) -> RawMesh {
 }
 
 /// Every vertex moved by up to `noise` (m) along each axis.
-#[must_use]
 pub fn rough(mut raw: RawMesh, noise: f64, seed: u64) -> RawMesh {
     let mut random = Random(seed);
     if noise > 0.0 {

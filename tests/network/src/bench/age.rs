@@ -47,9 +47,6 @@ pub struct Age {
 }
 
 /// Sends states for `duration` to a client behind a good network and one whose states suffer `impairment`, decided by `seed`.
-///
-/// # Errors
-/// The session does not come about.
 pub fn measure(duration: Duration, impairment: &Impairment, seed: u64) -> Result<Age, BenchError> {
     on_own_thread("age", || {
         let fifo = request_fifo(PRIORITY);

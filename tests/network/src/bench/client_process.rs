@@ -76,9 +76,6 @@ pub(super) fn states_and_lost(client: &mut Process) -> Result<[u64; 2], BenchErr
 }
 
 /// What such a process does: joins, says so, takes states until its standard input ends, and answers each line there with what it got.
-///
-/// # Errors
-/// It does not get in.
 pub fn client(server: &str, node: &str, transport: &str, key: &Path) -> Result<(), BenchError> {
     let runtime = Runtime::new()?;
     let key = taut_link::read_key_file(key)?;

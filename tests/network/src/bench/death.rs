@@ -39,9 +39,6 @@ pub struct Aftermath {
 }
 
 /// Kills or stops a node of a session with the server's own timeouts. `this` is this program, for the node's process.
-///
-/// # Errors
-/// The session does not come about, or the node is never let go.
 pub fn measure(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
     on_own_thread("death", || measure_here(this, death))
 }

@@ -29,9 +29,6 @@ pub struct Events {
 }
 
 /// Sends events for `duration` through a network that suffers `impairment` both ways, decided by `seed`.
-///
-/// # Errors
-/// The session does not come about.
 pub fn measure(
     duration: Duration,
     impairment: &Impairment,

@@ -44,9 +44,6 @@ pub struct Failover {
 }
 
 /// Runs it once, with a server that gives nodes up, and is given up, after `node_timeout`. `this` is this program, for the server's process.
-///
-/// # Errors
-/// The session does not come about, or nobody comes back.
 pub fn measure(this: &Path, node_timeout: Duration) -> Result<Failover, BenchError> {
     on_own_thread("fail-over", || measure_here(this, node_timeout))
 }

@@ -64,7 +64,6 @@ pub struct Isolation {
 
 impl Isolation {
     /// Median over the turns of the 99th percentiles: alone, crowded, us.
-    #[must_use]
     pub fn p99(&self) -> [f64; 2] {
         [&self.alone, &self.crowded].map(|turns| {
             let mut values: Vec<f64> = turns.iter().map(|turn| turn.p99).collect();
@@ -75,9 +74,6 @@ impl Isolation {
 }
 
 /// Runs `program` without and with clients, `turns` times each for `duration`, in the order a b b a. `this` is this program, for the stalled clients.
-///
-/// # Errors
-/// The program does not run as expected.
 pub fn measure(
     program: &Path,
     this: &Path,

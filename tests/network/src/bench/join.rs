@@ -20,9 +20,6 @@ pub struct Join {
 }
 
 /// Joins so many times, one after the other.
-///
-/// # Errors
-/// The session does not come about.
 pub fn measure(times: usize) -> Result<Join, BenchError> {
     let runtime = tokio::runtime::Runtime::new()?;
     let key = ClusterKey::generate()?;

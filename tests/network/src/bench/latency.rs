@@ -49,9 +49,6 @@ pub struct Latency {
 }
 
 /// Measures for `duration`; `full` sends the largest states (about 1000 bytes), else small ones (about 200).
-///
-/// # Errors
-/// The session does not come about.
 pub fn measure(duration: Duration, full: bool) -> Result<Latency, BenchError> {
     on_own_thread("latency", || {
         let fifo = request_fifo(PRIORITY);

@@ -29,9 +29,6 @@ pub struct LeaderProcess {
 
 impl LeaderProcess {
     /// Starts it as `this` program's `--lead`, with the cluster key of a file, at the addresses of both planes.
-    ///
-    /// # Errors
-    /// No server started.
     pub fn start(
         this: &Path,
         key: &Path,
@@ -58,30 +55,22 @@ impl LeaderProcess {
     }
 
     /// Address of its control plane.
-    #[must_use]
     pub fn quic(&self) -> &str {
         &self.quic
     }
 
     /// Address of its pose plane.
-    #[must_use]
     pub fn udp(&self) -> &str {
         &self.udp
     }
 
     /// Stops it as it stands, or lets it go on.
-    ///
-    /// # Errors
-    /// It is gone.
     pub fn signal(&self, signal: Signal) -> Result<(), BenchError> {
         self.process.signal(signal)
     }
 }
 
 /// What the server's process does: says where it serves, broadcasts, and leads frames until its standard input ends.
-///
-/// # Errors
-/// It cannot serve there.
 pub fn lead(quic: &str, udp: &str, key: &Path, node_timeout: Duration) -> Result<(), BenchError> {
     let _ = request_fifo(PRIORITY);
     let address = |text: &str| {

@@ -15,9 +15,6 @@ pub struct Resources {
 
 impl Resources {
     /// Of the process with this number.
-    ///
-    /// # Errors
-    /// There is no such process, or no `/proc`.
     pub fn of(process: u32) -> std::io::Result<Resources> {
         let place = PathBuf::from(format!("/proc/{process}"));
         let text = std::fs::read_to_string(place.join("statm"))?;

@@ -33,9 +33,6 @@ pub struct Got {
 }
 
 /// Joins and takes states for `duration`.
-///
-/// # Errors
-/// The node does not get in, or is thrown out.
 pub fn run(
     server: &str,
     node: &str,

@@ -17,7 +17,6 @@ pub struct Quantiles {
 
 impl Quantiles {
     /// Of `values`, by the nearest rank; all NaN where there are none, which meets no target.
-    #[must_use]
     pub fn of(mut values: Vec<f64>) -> Quantiles {
         values.sort_by(f64::total_cmp);
         let count = values.len();

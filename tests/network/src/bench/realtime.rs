@@ -17,7 +17,6 @@ pub fn request_fifo(priority: u8) -> bool {
 }
 
 /// Keeps idle processors from sleeping deeply while it is held, as `taut serve` does; `None` where the system refuses it.
-#[must_use]
 pub fn keep_cores_awake() -> Option<File> {
     let mut held = OpenOptions::new()
         .write(true)
@@ -36,7 +35,6 @@ pub struct Ticker {
 
 impl Ticker {
     /// The first deadline is one period from now.
-    #[must_use]
     pub fn new(period: Duration) -> Ticker {
         Ticker {
             period,

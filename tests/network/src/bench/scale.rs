@@ -51,7 +51,6 @@ pub enum Place {
 
 impl Place {
     /// The server's address.
-    #[must_use]
     pub fn address(&self) -> Ipv4Addr {
         match self {
             Place::Loopback => Ipv4Addr::LOCALHOST,
@@ -97,9 +96,6 @@ fn thread_time() -> Duration {
 }
 
 /// Compares the ways to send a state to `receivers` sockets of this process.
-///
-/// # Errors
-/// The system has no sockets, or does not send.
 pub fn ways(receivers: usize) -> Result<Ways, BenchError> {
     on_own_thread("ways", || {
         let sender = UdpSocket::bind("127.0.0.1:0")?;
@@ -215,9 +211,6 @@ fn taken_and_lost(clients: &mut [Process]) -> Result<[u64; 2], BenchError> {
 }
 
 /// Serves `clients` processes for `seconds` at 1 kHz; to a group where there is one, once all hear it.
-///
-/// # Errors
-/// A process does not join, or the system has no sockets.
 pub fn cost(
     this: &Path,
     place: &Place,

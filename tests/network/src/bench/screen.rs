@@ -50,9 +50,6 @@ pub struct Screen {
 
 impl Screen {
     /// Joins on `runtime`, and draws in a thread of its own; `seed` decides how long.
-    ///
-    /// # Errors
-    /// It does not get in.
     pub fn start(
         runtime: &Runtime,
         options: ClientOptions,
@@ -90,39 +87,31 @@ impl Screen {
     }
 
     /// Its first session.
-    #[must_use]
     pub fn link(&self) -> &ClientLink {
         &self.link
     }
 
     /// Sessions that it has taken over, the first included.
-    #[must_use]
     pub fn sessions(&self) -> u64 {
         self.sessions.load(Ordering::Relaxed)
     }
 
     /// Number of the session that it has: of nodes without a server the lowest leads.
-    #[must_use]
     pub fn session(&self) -> u64 {
         self.session.load(Ordering::Relaxed)
     }
 
     /// Number of the newest frame that it showed.
-    #[must_use]
     pub fn frame(&self) -> u64 {
         self.frame.load(Ordering::Relaxed)
     }
 
     /// How many frames it has shown.
-    #[must_use]
     pub fn shown(&self) -> u64 {
         self.shown.load(Ordering::Relaxed)
     }
 
     /// Ends it without a word to anybody; what it showed.
-    ///
-    /// # Errors
-    /// Its thread panicked.
     pub fn end(mut self) -> Result<Vec<Swapped>, BenchError> {
         self.stop.store(true, Ordering::Relaxed);
         let shown = self.thread.take().map(JoinHandle::join);
@@ -210,7 +199,6 @@ pub struct Together {
 }
 
 /// What the nodes showed together, of frames for which `counts`.
-#[must_use]
 pub fn together(nodes: &[Vec<Swapped>], counts: impl Fn(&Swapped) -> bool) -> Together {
     // A frame of one term has one number and one count of sessions.
     let mut frames: HashMap<(u64, u64), Vec<&Swapped>> = HashMap::new();
@@ -233,7 +221,6 @@ pub fn together(nodes: &[Vec<Swapped>], counts: impl Fn(&Swapped) -> bool) -> To
 }
 
 /// Longest time between two swaps of one node between two moments, ms: the moments themselves count as none.
-#[must_use]
 pub fn longest_gap_ms(shown: &[Swapped], from: Instant, to: Instant) -> f64 {
     let ends_within = |pair: &&[Swapped]| pair[1].at > from && pair[0].at < to;
     let gaps = shown.windows(2).filter(ends_within);

@@ -46,9 +46,6 @@ pub struct ScreenDeath {
 }
 
 /// Kills or stops a node of a session of `program`.
-///
-/// # Errors
-/// The programs do not run as expected; with the reason, where there is nothing to draw with.
 pub fn measure(program: &Path, death: Death) -> Result<ScreenDeath, BenchError> {
     let rate = RATE.to_string();
     let workbench = Workbench::new(program, |file| set(file, "frames.rate", RATE as i64))?;

@@ -36,9 +36,6 @@ pub struct ServerKill {
 }
 
 /// Runs it once with `program`.
-///
-/// # Errors
-/// The programs do not run as expected.
 pub fn measure(program: &Path) -> Result<ServerKill, BenchError> {
     let remote = Table::from_iter([("kind".to_owned(), Value::from("remote"))]);
     let workbench = Workbench::new(program, |file| {

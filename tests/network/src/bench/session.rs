@@ -39,7 +39,6 @@ pub enum BenchError {
 }
 
 /// A server on free ports of 127.0.0.1 that forgives a busy machine.
-#[must_use]
 pub fn server_options(key: &ClusterKey) -> ServerOptions {
     ServerOptions {
         idle_timeout: FORGIVING,
@@ -49,7 +48,6 @@ pub fn server_options(key: &ClusterKey) -> ServerOptions {
 }
 
 /// A client of `server` that forgives a busy machine.
-#[must_use]
 pub fn client_options(
     server: &ServerLink,
     key: &ClusterKey,
@@ -64,9 +62,6 @@ pub fn client_options(
 }
 
 /// A server of one triangle behind a relay: clients are told to send their datagrams to the relay.
-///
-/// # Errors
-/// Either does not start.
 pub fn serve_behind(
     runtime: &Runtime,
     mut options: ServerOptions,
@@ -81,7 +76,6 @@ pub fn serve_behind(
 }
 
 /// A device's reading of this number, at rest and without force.
-#[must_use]
 pub fn reading(index: u64) -> InputSample {
     InputSample {
         sample_time_ns: 0,
@@ -97,16 +91,11 @@ pub fn reading(index: u64) -> InputSample {
 }
 
 /// A scene of one triangle.
-#[must_use]
 pub fn small_content() -> Content {
     content_with(1)
 }
 
 /// A scene of one mesh with this many triangles, 36 bytes each in single precision.
-///
-/// # Panics
-/// If that is more than a mesh may have.
-#[must_use]
 pub fn content_with(triangles: u32) -> Content {
     let positions = (0..triangles + 2)
         .map(|i| [i as f32 * 1e-3, (i % 2) as f32 * 1e-3, 0.0])
@@ -129,7 +118,6 @@ pub fn content_with(triangles: u32) -> Content {
 }
 
 /// A state of `tick`, sampled at `sample_time_ns`; `full` has everything that a state may hold but the events, else one tool.
-#[must_use]
 pub fn state(tick: u64, sample_time_ns: u64, full: bool) -> HotState {
     let mut state = HotState {
         tick,
@@ -172,9 +160,6 @@ pub fn state(tick: u64, sample_time_ns: u64, full: bool) -> HotState {
 }
 
 /// Waits for a condition.
-///
-/// # Errors
-/// It does not hold within a minute: only a hang takes that long.
 pub fn wait_until(what: &str, mut done: impl FnMut() -> bool) -> Result<(), BenchError> {
     let start = Instant::now();
     while !done() {

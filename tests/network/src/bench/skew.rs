@@ -91,7 +91,6 @@ impl Turns {
 
 impl OverTurns {
     /// Of each turn's figure.
-    #[must_use]
     pub fn of(each: Vec<f64>) -> OverTurns {
         let mut sorted = each.clone();
         sorted.sort_by(f64::total_cmp);
@@ -104,18 +103,12 @@ impl OverTurns {
 }
 
 /// Runs a plan so many times.
-///
-/// # Errors
-/// A session does not come about.
 pub fn measure_turns(plan: Plan, turns: usize) -> Result<Turns, BenchError> {
     let runs: Result<Vec<_>, _> = (0..turns).map(|_| measure(plan)).collect();
     Ok(Turns(runs?))
 }
 
 /// Runs it.
-///
-/// # Errors
-/// The session does not come about.
 pub fn measure(plan: Plan) -> Result<Skew, BenchError> {
     on_own_thread("skew", || measure_here(plan, request_fifo(PRIORITY)))
 }
@@ -168,7 +161,6 @@ fn measure_here(plan: Plan, fifo: bool) -> Result<Skew, BenchError> {
 }
 
 /// Frames of this rate.
-#[must_use]
 pub fn settings(swap: Swap, rate: u64) -> MasterSettings {
     MasterSettings {
         swap,
@@ -186,9 +178,6 @@ pub struct Leading {
 
 impl Leading {
     /// Starts them.
-    ///
-    /// # Errors
-    /// The server leads no frames, or the system has no thread.
     pub fn start(server: &ServerLink) -> Result<Leading, BenchError> {
         let mut master = server
             .frame_master()
@@ -207,9 +196,6 @@ impl Leading {
     }
 
     /// Ends them.
-    ///
-    /// # Errors
-    /// One panicked.
     pub fn end(self) -> Result<(), BenchError> {
         self.stop.store(true, Ordering::Relaxed);
         self.states.end()?;

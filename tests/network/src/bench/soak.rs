@@ -75,9 +75,6 @@ struct Member {
 }
 
 /// Runs until `log` is as old as `duration`, decided by `seed`.
-///
-/// # Errors
-/// The server does not come about, does not let somebody go, or the log cannot be written.
 pub fn run(duration: Duration, seed: u64, log: &mut SoakLog) -> Result<Soak, BenchError> {
     let runtime = runtime(2)?;
     let keys = [ClusterKey::generate()?, ClusterKey::generate()?];
@@ -102,7 +99,7 @@ pub fn run(duration: Duration, seed: u64, log: &mut SoakLog) -> Result<Soak, Ben
         server: &server,
         relay: &relay,
         keys: &keys,
-        random: Random::new(seed),
+        random: Random(seed),
         members: Vec::new(),
         result: Soak::default(),
     };
@@ -243,7 +240,7 @@ impl Attack {
     /// Until told to stop; how many states and forgeries.
     fn run(mut self, seed: u64) -> Result<(u64, u64), BenchError> {
         let thief = UdpSocket::bind("127.0.0.1:0")?;
-        let (mut forger, mut random) = (Forger::new(seed, 0, 1), Random::new(seed + 1));
+        let (mut forger, mut random) = (Forger::new(seed, 0, 1), Random(seed + 1));
         let payloads = payload_of_every_kind();
         let genuine = crate::forge::OneWay::new(seed, 0, 1);
         let seen = Seen {

@@ -63,9 +63,6 @@ impl Growth {
 
 impl SoakLog {
     /// A log in memory alone, or one that is in a file, too: what the file has already is part of it.
-    ///
-    /// # Errors
-    /// The file cannot be written, or is none of a soak.
     pub fn open(path: Option<&Path>) -> Result<SoakLog, BenchError> {
         let mut log = SoakLog {
             file: None,
@@ -138,21 +135,16 @@ impl SoakLog {
     }
 
     /// Time soaked so far, that of earlier parts included, s.
-    #[must_use]
     pub fn elapsed_s(&self) -> f64 {
         self.before_s + self.start.elapsed().as_secs_f64()
     }
 
     /// A name for a process that starts now.
-    #[must_use]
     pub fn name(&self, process: &str) -> String {
         format!("{process} from {:.1} s", self.elapsed_s())
     }
 
     /// Writes down what `process`, by its number, has now.
-    ///
-    /// # Errors
-    /// It is gone, or the file cannot be written.
     pub fn note(&mut self, process: &str, number: u32) -> Result<(), BenchError> {
         let resources = Resources::of(number)?;
         self.write(&format!(
@@ -165,9 +157,6 @@ impl SoakLog {
     }
 
     /// Writes down a promise that was broken.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn broke(&mut self, what: &str) -> Result<(), BenchError> {
         let what = what.replace([',', '\n', '\r'], ";");
         self.write(&format!("soak,,,,{what}"))?;
@@ -184,13 +173,11 @@ impl SoakLog {
     }
 
     /// Promises that were broken, one sentence each.
-    #[must_use]
     pub fn broken(&self) -> &[String] {
         &self.broken
     }
 
     /// Resources of each process that lived long enough.
-    #[must_use]
     pub fn growth(&self) -> Vec<Growth> {
         let mut processes = BTreeMap::<&str, Vec<Resources>>::new();
         for moment in &self.moments {

@@ -56,16 +56,13 @@ pub struct ProgramSoak {
 }
 
 /// Runs `program` until `log` is as old as `duration`, decided by `seed`.
-///
-/// # Errors
-/// The program does not start, ends by itself or does not come back; the log cannot be written.
 pub fn run(
     program: &Path,
     duration: Duration,
     seed: u64,
     log: &mut SoakLog,
 ) -> Result<ProgramSoak, BenchError> {
-    let mut random = Random::new(seed ^ log.elapsed_s().to_bits());
+    let mut random = Random(seed ^ log.elapsed_s().to_bits());
     let life_s = (LIFE_SHARE * duration.as_secs_f64()).clamp(LIFE_S.0, LIFE_S.1);
     let this = log.name("nodes");
     let mut cast = Cast::start(program, log)?;

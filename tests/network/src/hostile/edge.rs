@@ -95,7 +95,7 @@ fn forces(resting: &Resting, world: &World, settings: &Settings) -> Vec<[f64; 6]
 }
 
 fn drawn(random: &mut Random) -> Settings {
-    let mut factor = || 0.5 + 1.5 * random.share();
+    let mut factor = || 0.5 + 1.5 * random.unit();
     let plain = Settings::for_size(0.1 * factor());
     Settings {
         k_s: plain.k_s * factor() * 0.5,
@@ -116,7 +116,7 @@ fn drawn(random: &mut Random) -> Settings {
 
 fn settings_at_the_edge(_: &Extent) -> Result<Finding, BenchError> {
     let resting = Resting::new()?;
-    let mut random = Random::new(7);
+    let mut random = Random(7);
     let (mut same, mut felt) = (0, 0);
     for _ in 0..DRAWS {
         let settings = drawn(&mut random);

@@ -54,9 +54,6 @@ pub fn attacks() -> impl Iterator<Item = &'static Attack> {
 }
 
 /// Runs all attacks.
-///
-/// # Errors
-/// An attack could not be carried out.
 pub fn rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     attacks()
         .map(|attack| {

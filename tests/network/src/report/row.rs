@@ -123,7 +123,6 @@ impl fmt::Display for Verdict {
 }
 
 /// The rows as a table.
-#[must_use]
 pub fn table(rows: &[Row]) -> String {
     let mut text = "| measure | target | measured | |\n|---|---|---|---|\n".to_owned();
     for row in rows {
@@ -136,7 +135,6 @@ pub fn table(rows: &[Row]) -> String {
 }
 
 /// The rows as CSV, RFC 4180.
-#[must_use]
 pub fn csv(rows: &[Row]) -> String {
     let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     let mut text = "measure,target,measured,verdict\n".to_owned();

@@ -429,7 +429,6 @@ fn elsewhere(_: &Extent) -> Result<Vec<Row>, BenchError> {
 
 impl Extent {
     /// What the report of a release takes, beside the program at `this`.
-    #[must_use]
     pub fn full(this: &Path) -> Extent {
         Extent {
             seconds: 20.0,
@@ -451,7 +450,6 @@ impl Extent {
     }
 
     /// A few seconds in all: the figures mean little, the invariants hold.
-    #[must_use]
     pub fn quick(this: &Path) -> Extent {
         Extent {
             seconds: 1.0,

@@ -4,8 +4,6 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::TriangleFeature;
-
 /// Doubled area over the longest side squared below which the inside is empty, to rounding.
 const NO_AREA: f64 = 16.0 * f64::EPSILON;
 
@@ -16,8 +14,6 @@ pub struct ClosestOnTriangle {
     pub point: Point3<f64>,
     /// Weights of the corners there; they sum to 1.
     pub barycentric: [f64; 3],
-    /// The feature on which it lies.
-    pub feature: TriangleFeature,
 }
 
 /// The point of triangle `t` nearest to `p`; a triangle without area is treated as its sides.
@@ -31,33 +27,33 @@ pub fn closest_on_triangle(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> ClosestOnTr
     let (ap, bp, cp) = (p - a, p - b, p - c);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {
-        return at(t, [1.0, 0.0, 0.0], TriangleFeature::Corner(0));
+        return at(t, [1.0, 0.0, 0.0]);
     }
     let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
     if d3 >= 0.0 && d4 <= d3 {
-        return at(t, [0.0, 1.0, 0.0], TriangleFeature::Corner(1));
+        return at(t, [0.0, 1.0, 0.0]);
     }
     let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
     if d6 >= 0.0 && d5 <= d6 {
-        return at(t, [0.0, 0.0, 1.0], TriangleFeature::Corner(2));
+        return at(t, [0.0, 0.0, 1.0]);
     }
     let vc = d1 * d4 - d3 * d2;
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
         let s = d1 / (d1 - d3);
-        return at(t, [1.0 - s, s, 0.0], TriangleFeature::Side(0));
+        return at(t, [1.0 - s, s, 0.0]);
     }
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 >= d3 && d5 >= d6 {
         let s = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return at(t, [0.0, 1.0 - s, s], TriangleFeature::Side(1));
+        return at(t, [0.0, 1.0 - s, s]);
     }
     let vb = d5 * d2 - d1 * d6;
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
         let s = d2 / (d2 - d6);
-        return at(t, [1.0 - s, 0.0, s], TriangleFeature::Side(2));
+        return at(t, [1.0 - s, 0.0, s]);
     }
     let sum = va + vb + vc;
-    at(t, [va / sum, vb / sum, vc / sum], TriangleFeature::Face)
+    at(t, [va / sum, vb / sum, vc / sum])
 }
 
 /// The nearest of the three feet on the sides.
@@ -72,12 +68,7 @@ fn closest_on_sides(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> ClosestOnTriangle 
         };
         let mut weights = [0.0; 3];
         (weights[k], weights[(k + 1) % 3]) = (1.0 - s, s);
-        let feature = match s {
-            0.0 => TriangleFeature::Corner(k as u8),
-            1.0 => TriangleFeature::Corner(((k + 1) % 3) as u8),
-            _ => TriangleFeature::Side(k as u8),
-        };
-        at(t, weights, feature)
+        at(t, weights)
     };
     let nearer = |a: ClosestOnTriangle, b: ClosestOnTriangle| {
         if (b.point - p).norm_squared() < (a.point - p).norm_squared() {
@@ -90,13 +81,12 @@ fn closest_on_sides(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> ClosestOnTriangle 
 }
 
 #[inline]
-fn at(t: &[Point3<f64>; 3], barycentric: [f64; 3], feature: TriangleFeature) -> ClosestOnTriangle {
+fn at(t: &[Point3<f64>; 3], barycentric: [f64; 3]) -> ClosestOnTriangle {
     let point =
         t[0].coords * barycentric[0] + t[1].coords * barycentric[1] + t[2].coords * barycentric[2];
     ClosestOnTriangle {
         point: Point3::from(point),
         barycentric,
-        feature,
     }
 }
 
@@ -117,36 +107,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_region_answers_with_its_feature() {
+    fn each_region_answers_with_its_point() {
         let t = [
             Point3::new(0.0, 0.0, 0.0),
             Point3::new(1.0, 0.0, 0.0),
             Point3::new(0.0, 1.0, 0.0),
         ];
         let cases = [
-            ([0.25, 0.25, 2.0], [0.25, 0.25, 0.0], TriangleFeature::Face),
-            (
-                [-1.0, -1.0, 1.0],
-                [0.0, 0.0, 0.0],
-                TriangleFeature::Corner(0),
-            ),
-            (
-                [3.0, -1.0, 0.0],
-                [1.0, 0.0, 0.0],
-                TriangleFeature::Corner(1),
-            ),
-            (
-                [-1.0, 3.0, 0.0],
-                [0.0, 1.0, 0.0],
-                TriangleFeature::Corner(2),
-            ),
-            ([0.5, -1.0, 0.0], [0.5, 0.0, 0.0], TriangleFeature::Side(0)),
-            ([1.0, 1.0, 5.0], [0.5, 0.5, 0.0], TriangleFeature::Side(1)),
-            ([-2.0, 0.5, 0.0], [0.0, 0.5, 0.0], TriangleFeature::Side(2)),
+            ([0.25, 0.25, 2.0], [0.25, 0.25, 0.0]),
+            ([-1.0, -1.0, 1.0], [0.0, 0.0, 0.0]),
+            ([3.0, -1.0, 0.0], [1.0, 0.0, 0.0]),
+            ([-1.0, 3.0, 0.0], [0.0, 1.0, 0.0]),
+            ([0.5, -1.0, 0.0], [0.5, 0.0, 0.0]),
+            ([1.0, 1.0, 5.0], [0.5, 0.5, 0.0]),
+            ([-2.0, 0.5, 0.0], [0.0, 0.5, 0.0]),
         ];
-        for (p, q, feature) in cases {
+        for (p, q) in cases {
             let found = closest_on_triangle(&Point3::from(p), &t);
-            assert_eq!(found.feature, feature);
             assert!((found.point - Point3::from(q)).norm() < 1e-15);
         }
     }

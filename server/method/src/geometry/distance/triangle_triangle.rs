@@ -6,7 +6,6 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::TriangleFeature::{self, Corner, Face, Side};
 use super::edge_edge::closest_on_edges;
 
 /// Closest points of two triangles.
@@ -16,10 +15,6 @@ pub struct ClosestOnTriangles {
     pub on_first: Point3<f64>,
     /// Point on the second, m.
     pub on_second: Point3<f64>,
-    /// Feature of the first on which its point lies.
-    pub first_feature: TriangleFeature,
-    /// Feature of the second on which its point lies.
-    pub second_feature: TriangleFeature,
     /// Squared distance, m^2.
     pub squared_distance: f64,
 }
@@ -33,10 +28,10 @@ pub fn closest_on_triangles(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> Close
     let (normal_a, normal_b) = (doubled_normal(a), doubled_normal(b));
     for k in 0..3 {
         if let Some(foot) = foot_inside(&a[k], b, &normal_b) {
-            best.improve(a[k], foot, Corner(k as u8), Face);
+            best.improve(a[k], foot);
         }
         if let Some(foot) = foot_inside(&b[k], a, &normal_a) {
-            best.improve(foot, b[k], Face, Corner(k as u8));
+            best.improve(foot, b[k]);
         }
     }
     best
@@ -44,20 +39,12 @@ pub fn closest_on_triangles(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> Close
 
 impl ClosestOnTriangles {
     #[inline]
-    fn improve(
-        &mut self,
-        on_first: Point3<f64>,
-        on_second: Point3<f64>,
-        first_feature: TriangleFeature,
-        second_feature: TriangleFeature,
-    ) {
+    fn improve(&mut self, on_first: Point3<f64>, on_second: Point3<f64>) {
         let squared_distance = (on_first - on_second).norm_squared();
         if squared_distance < self.squared_distance {
             *self = Self {
                 on_first,
                 on_second,
-                first_feature,
-                second_feature,
                 squared_distance,
             };
         }
@@ -91,21 +78,9 @@ fn closest_sides(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> (ClosestOnTriang
     let closest = ClosestOnTriangles {
         on_first: a[i] + (a[(i + 1) % 3] - a[i]) * s,
         on_second: b[j] + (b[(j + 1) % 3] - b[j]) * t,
-        first_feature: side_or_corner(i, s),
-        second_feature: side_or_corner(j, t),
         squared_distance: least,
     };
     (closest, certain)
-}
-
-fn side_or_corner(side: usize, fraction: f64) -> TriangleFeature {
-    if fraction <= 0.0 {
-        Corner(side as u8)
-    } else if fraction >= 1.0 {
-        Corner(((side + 1) % 3) as u8)
-    } else {
-        Side(side as u8)
-    }
 }
 
 #[inline]

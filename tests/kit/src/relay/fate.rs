@@ -44,7 +44,6 @@ pub struct Fates {
 
 impl Fates {
     /// Fates by `seed` of the flow of this number.
-    #[must_use]
     pub fn new(impairment: Impairment, seed: u64, flow: u64, direction: Direction) -> Fates {
         let stream = 2 * flow + u64::from(direction == Direction::Down);
         Fates {
@@ -61,7 +60,7 @@ impl Fates {
         self.number += 1;
         let (plan, random) = (&self.impairment, &mut self.random);
         // Each datagram draws the same numbers, whatever comes of them: settings do not shift each other's dice.
-        let [alone, burst, swapped, doubled, flipped, jitter] = [(); 6].map(|()| random.share());
+        let [alone, burst, swapped, doubled, flipped, jitter] = [(); 6].map(|()| random.unit());
         let bit = random.word();
         if let Some(bursts) = plan.bursts
             && self.burst_left == 0

@@ -48,17 +48,11 @@ pub struct Waiting {
 
 impl Waiting {
     /// A free port of 127.0.0.1.
-    ///
-    /// # Errors
-    /// The system gives none.
     pub fn bind() -> Result<Waiting, RelayError> {
         Waiting::bind_to(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)))
     }
 
     /// This address.
-    ///
-    /// # Errors
-    /// The system does not give it.
     pub fn bind_to(address: SocketAddr) -> Result<Waiting, RelayError> {
         let socket = open(address).map_err(failed("open its socket"))?;
         let address = socket.local_addr().map_err(failed("read its address"))?;
@@ -66,15 +60,11 @@ impl Waiting {
     }
 
     /// Where clients are to send.
-    #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
     /// Starts forwarding to `server`. The first client that sends gets the first treatment, and so on; the last is for all that follow.
-    ///
-    /// # Errors
-    /// The system starts no thread.
     pub fn start(
         self,
         server: SocketAddr,
@@ -124,7 +114,6 @@ pub struct Relay {
 
 impl Relay {
     /// Where clients are to send.
-    #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -147,7 +136,6 @@ impl Relay {
     }
 
     /// What was done to datagrams of this direction.
-    #[must_use]
     pub fn counts(&self, direction: Direction) -> RelayCounts {
         match direction {
             Direction::Up => self.shared.up.read(),
@@ -156,7 +144,6 @@ impl Relay {
     }
 
     /// The first 1,000 datagrams that clients sent, as they came.
-    #[must_use]
     pub fn upstream(&self) -> Vec<Vec<u8>> {
         let kept = self.shared.upstream.lock();
         kept.unwrap_or_else(PoisonError::into_inner).clone()

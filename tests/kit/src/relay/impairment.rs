@@ -58,7 +58,6 @@ pub struct Impairment {
 
 impl Impairment {
     /// Loses this share, each datagram for itself.
-    #[must_use]
     pub fn losing(share: f64) -> Impairment {
         Impairment {
             lost: share,
@@ -87,7 +86,6 @@ pub struct Treatment {
 
 impl Treatment {
     /// The same both ways.
-    #[must_use]
     pub fn both_ways(impairment: Impairment) -> Treatment {
         Treatment {
             up: impairment.clone(),

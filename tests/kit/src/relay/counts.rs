@@ -46,7 +46,6 @@ counts! {
 
 impl RelayCounts {
     /// Datagrams that did not pass.
-    #[must_use]
     pub fn all_lost(&self) -> u64 {
         self.lost + self.lost_in_bursts + self.swallowed + self.too_long
     }
