@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::geometry_shapes::{icosphere, mesh};
+use crate::geometry_shapes::{cuboid, icosphere, mesh};
 use god_object::collision::{
-    AdvancementSettings, CollisionWorkspace, Motion, Work, time_of_impact,
+    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
 };
 use god_object::nalgebra::{Matrix3, Point3, Vector3};
 use god_object::spatial::six;
@@ -130,7 +130,7 @@ fn forces_and_work_do_not_depend_on_the_order_of_the_obstacles() {
 }
 
 #[test]
-fn obstacles_far_away_change_no_force_and_cost_no_more_than_their_roots() {
+fn obstacles_far_away_change_no_force_and_cost_nothing() {
     let near = pebbles(0.03);
     let course = Course::among(near.clone());
     let far = pebbles(10.0);
@@ -142,15 +142,57 @@ fn obstacles_far_away_change_no_force_and_cost_no_more_than_their_roots() {
         };
         let other = Course::among(more);
         assert_eq!(course.off(&other), 0.0);
-        let (work, others) = (course.near_work(), other.near_work());
-        for (a, b) in work.into_iter().zip(others) {
-            assert!(alike(a, b), "{work:?} {others:?}");
-        }
-        // Each of them: one pair of volumes in each search and collection.
-        let most = 2 * u64::from(other.substeps + UPDATES) * PEBBLES as u64;
-        let added = other.work.node_pairs.saturating_sub(course.work.node_pairs);
-        assert!(added <= most, "{added} {most}");
+        assert_eq!(course.work, other.work);
     }
+}
+
+/// The twin is out of reach, but the box about both pebbles holds the body: it is searched in full.
+#[test]
+fn what_a_motion_cannot_reach_is_free_to_a_full_search_and_costs_nothing() {
+    let bar = mesh(cuboid([0.05, 0.004, 0.003]));
+    let (vertices, triangles) = icosphere(6e-3, 1);
+    let twin = vertices.iter().map(|v| v - Vector3::repeat(10.0));
+    let after = vertices.len() as u32;
+    let of_twin = triangles.iter().map(|t| t.map(|v| v + after));
+    let both = mesh((
+        vertices.iter().copied().chain(twin).collect(),
+        triangles.iter().copied().chain(of_twin).collect(),
+    ));
+    let pebble = mesh((vertices, triangles));
+    let settings = AdvancementSettings::default();
+    let (mut left_alone, mut stopped) = (0, 0);
+    for k in 0..600 {
+        let u = f64::from(k);
+        let aside = Vector3::new(u.sin(), (1.7 * u).sin(), (2.3 * u).sin());
+        let out = aside.map(|x| 0.2 + x.abs()).normalize();
+        let distance = 0.02 + 0.1 * (0.37 * u).sin().abs();
+        let at = Pose::new(out * distance, Vector3::zeros());
+        let motion = Motion {
+            start: Pose::rotation(aside * 2.0),
+            displacement: six(&(out * 0.02), &(aside.yzx() * 3.0)),
+            reference_point: Point3::new(0.01, 0.0, 0.0),
+        };
+        let [(found, work), (expected, full)] = [&pebble, &both].map(|obstacle| {
+            let (mut workspace, mut work) = (CollisionWorkspace::new(), Work::default());
+            let found = time_of_impact(
+                &bar,
+                &motion,
+                obstacle,
+                &at,
+                &settings,
+                &mut workspace,
+                &mut work,
+            );
+            (found, work)
+        });
+        assert!(full.node_pairs > 0);
+        if work == Work::default() {
+            assert_eq!([found, expected], [TimeOfImpact::Separated; 2], "{k}");
+            left_alone += 1;
+        }
+        stopped += u32::from(matches!(expected, TimeOfImpact::Impact { .. }));
+    }
+    assert!(left_alone > 200 && stopped > 40, "{left_alone} {stopped}");
 }
 
 #[test]

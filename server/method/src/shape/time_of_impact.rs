@@ -45,6 +45,13 @@ impl<'a> Form<'a> {
         }
     }
 
+    fn distance(&self, point: &nalgebra::Point3<f64>) -> f64 {
+        match self {
+            Self::Mesh(mesh) => mesh.box_distance(point),
+            Self::Primitive(primitive) => primitive.nearest(point).distance,
+        }
+    }
+
     fn radius_about(&self, point: &nalgebra::Point3<f64>) -> f64 {
         match self {
             Self::Mesh(mesh) => mesh.radius_bound_about(point),
@@ -82,6 +89,9 @@ pub(super) fn time_of_impact(
         slack,
         settings.max_iterations,
     );
+    if relative.stays_beyond(search.stop_gap, radius, |g| obstacle.distance(g)) {
+        return TimeOfImpact::Separated;
+    }
     let problem = Problem {
         body,
         obstacle,
