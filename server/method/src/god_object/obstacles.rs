@@ -13,10 +13,12 @@
 //!
 //! Before that, the body goes along with the obstacle that is nearest, as one rigid body with it, as far as that is free of the others; from there the
 //! hand leads it back. So a body in a part that moves does what it does in one that stands, with the same rows, and is searched for impact no more often.
-//! It stays where the obstacle slides past it without friction: in a late update it would be taken round what the hand does not lead it back about.
+//! It stays where the obstacle slides past it without friction or draws back: in a late update it would be taken round what the hand does not lead it
+//! back about.
 
 use nalgebra::Vector3;
 
+use super::look_ahead::TOUCHING_REST_DISTANCES;
 use super::placed_obstacle::{Ahead, PlacedObstacle};
 use super::{GodObject, StepReport};
 use crate::collision::{Motion, TimeOfImpact};
@@ -157,15 +159,15 @@ impl GodObject {
         nearest.map(|(_, placed)| *placed)
     }
 
-    /// Whether one of the obstacles that make the mover's motion does more than slide past the body without friction, which leaves it in the hand.
+    /// Whether one of the obstacles that make the mover's motion pushes the body, holds it by friction or would run into it. What slides past it or draws
+    /// back leaves it in the hand.
     fn is_taken_along(&mut self, mover: &PlacedObstacle, report: &mut StepReport) -> bool {
         for index in 0..self.obstacles.len() {
             let placed = self.obstacles[index];
             if !placed.goes_with(mover) {
                 continue;
             }
-            let rough = self.world.obstacles[index].surface.friction > 0.0;
-            if rough || !self.slides_past(index) {
+            if self.pushes_or_holds(index) {
                 return true;
             }
             let (_, time) = self.free_way(index, &placed.left(), report);
@@ -176,15 +178,18 @@ impl GodObject {
         false
     }
 
-    /// Whether no row of an obstacle becomes shorter or longer by the way that it has left.
-    fn slides_past(&self, index: usize) -> bool {
+    /// Whether a row of an obstacle becomes shorter by the way that it has left, or one of a rough obstacle touches.
+    fn pushes_or_holds(&self, index: usize) -> bool {
         let placed = &self.obstacles[index];
         let motion = placed.target * placed.pose.inverse();
+        let rough = self.world.obstacles[index].surface.friction > 0.0;
+        let touching = TOUCHING_REST_DISTANCES * self.settings.rest_distance;
         let rows = self.set.constraints.iter();
         let mut rows = rows.filter(|row| usize::from(row.features.obstacle) == index);
-        rows.all(|row| {
+        rows.any(|row| {
             let way = row.normal.dot(&(motion * row.point - row.point));
-            way.abs() <= self.settings.motion_tolerance // false for NaN
+            let free = way <= self.settings.motion_tolerance; // false for NaN
+            !free || (rough && row.gap <= touching)
         })
     }
 
