@@ -13,8 +13,8 @@
 //!
 //! Before that, the body goes along with the obstacle that is nearest, as one rigid body with it, as far as that is free of the others; from there the
 //! hand leads it back. So a body in a part that moves does what it does in one that stands, with the same rows, and is searched for impact no more often.
-//! It stays where the obstacle slides past it without friction or draws back: in a late update it would be taken round what the hand does not lead it
-//! back about.
+//! It stays where the obstacle slides past it without friction, draws back or does not reach it: in a late update it would be taken round what the hand
+//! does not lead it back about.
 
 use nalgebra::Vector3;
 
@@ -159,38 +159,43 @@ impl GodObject {
         nearest.map(|(_, placed)| *placed)
     }
 
-    /// Whether one of the obstacles that make the mover's motion pushes the body, holds it by friction or would run into it. What slides past it or draws
-    /// back leaves it in the hand.
+    /// Whether the obstacles that make the mover's motion hold the body, or one of them would run into it. What slides past it, draws back or comes near
+    /// leaves it in the hand.
     fn is_taken_along(&mut self, mover: &PlacedObstacle, report: &mut StepReport) -> bool {
+        if self.is_held_by(mover) {
+            return true;
+        }
         for index in 0..self.obstacles.len() {
             let placed = self.obstacles[index];
-            if !placed.goes_with(mover) {
-                continue;
-            }
-            if self.pushes_or_holds(index) {
-                return true;
-            }
-            let (_, time) = self.free_way(index, &placed.left(), report);
-            if time < 1.0 {
+            if placed.goes_with(mover) && self.free_way(index, &placed.left(), report).1 < 1.0 {
                 return true;
             }
         }
         false
     }
 
-    /// Whether a row of an obstacle becomes shorter by the way that it has left, or one of a rough obstacle touches.
-    fn pushes_or_holds(&self, index: usize) -> bool {
-        let placed = &self.obstacles[index];
-        let motion = placed.target * placed.pose.inverse();
-        let rough = self.world.obstacles[index].surface.friction > 0.0;
-        let touching = TOUCHING_REST_DISTANCES * self.settings.rest_distance;
-        let rows = self.set.constraints.iter();
-        let mut rows = rows.filter(|row| usize::from(row.features.obstacle) == index);
-        rows.any(|row| {
-            let way = row.normal.dot(&(motion * row.point - row.point));
-            let free = way <= self.settings.motion_tolerance; // false for NaN
-            !free || (rough && row.gap <= touching)
-        })
+    /// Whether the obstacles that make the mover's motion push the body, hold it by friction, or have it between what comes and what draws back.
+    fn is_held_by(&self, mover: &PlacedObstacle) -> bool {
+        let (rest, tolerance) = (self.settings.rest_distance, self.settings.motion_tolerance);
+        let (mut comes, mut draws_back) = (false, false);
+        for (index, placed) in self.obstacles.iter().enumerate() {
+            if !placed.goes_with(mover) {
+                continue;
+            }
+            let motion = placed.target * placed.pose.inverse();
+            let rough = self.world.obstacles[index].surface.friction > 0.0;
+            let rows = self.set.constraints.iter();
+            for row in rows.filter(|row| usize::from(row.features.obstacle) == index) {
+                let way = row.normal.dot(&(motion * row.point - row.point));
+                let free = way <= tolerance || row.gap - way >= rest; // false for NaN
+                if !free || (rough && row.gap <= TOUCHING_REST_DISTANCES * rest) {
+                    return true;
+                }
+                comes |= way > tolerance;
+                draws_back |= way < -tolerance;
+            }
+        }
+        comes && draws_back
     }
 
     /// A half-space has no farthest point: what counts is the part that the body can reach.
