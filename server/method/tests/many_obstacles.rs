@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::geometry_shapes::{cuboid, icosphere, mesh};
+use crate::support::box_on_table;
 use god_object::collision::{
     AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
 };
@@ -143,6 +144,38 @@ fn obstacles_far_away_change_no_force_and_cost_nothing() {
         let other = Course::among(more);
         assert_eq!(course.off(&other), 0.0);
         assert_eq!(course.work, other.work);
+    }
+}
+
+/// A ball that is swept about and turned far away, by 0.2 m in each update: the sets near by look no farther ahead for it, and what sticks stays.
+#[test]
+fn an_obstacle_that_moves_far_away_changes_nothing_near_by() {
+    for friction in [0.0, 0.5] {
+        let mut near = World::clone(&box_on_table());
+        near.obstacles[0].surface.friction = friction;
+        let mut both = near.clone();
+        both.obstacles.extend(pebbles(10.0).into_iter().take(1));
+        let settings = Settings::for_size(0.04);
+        let start = Pose::translation(0.0, 0.0, 0.03);
+        let mut led = [near, both]
+            .map(|world| GodObject::new(Arc::new(world), settings, start).expect("a free start"));
+        let far = led[1].obstacle_poses().last().copied().expect("a ball");
+        for update in 0..300 {
+            let u = f64::from(update);
+            let (aside, down) = ((u - 100.0).clamp(0.0, 100.0), u.min(100.0));
+            let device = Pose::translation(2e-6 * aside, 0.0, 0.03 - 2.2e-4 * down);
+            let swept = Vector3::new(0.2 * u.sin(), 0.0, 0.2 * u.cos());
+            led[1].move_obstacle(1, &(far * Pose::new(swept, Vector3::y() * u)));
+            for god_object in &mut led {
+                let report = god_object.step(&device, None);
+                assert_eq!(report.obstacles_blocked, 0);
+                let within = god_object.constraint_set().complete_within;
+                assert!(update < 250 || within < 1e-3, "{friction}: {within} m");
+            }
+        }
+        let [alone, beside] = led.map(|god_object| god_object.pose().translation.vector);
+        let off = (alone - beside).norm();
+        assert!(off < 0.1 * settings.rest_distance, "{friction}: {off} m");
     }
 }
 

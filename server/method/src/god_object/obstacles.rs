@@ -16,7 +16,7 @@
 //! It stays where the obstacle slides past it without friction, draws back or does not reach it: in a late update it would be taken round what the hand
 //! does not lead it back about.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::look_ahead::TOUCHING_REST_DISTANCES;
 use super::placed_obstacle::{Ahead, PlacedObstacle};
@@ -58,8 +58,14 @@ impl GodObject {
         usable
     }
 
-    /// Moves the obstacles to their targets, and the body out of their way. The longest path asked for, and how far the body went along with one, m.
-    pub(super) fn carry_obstacles(&mut self, report: &mut StepReport) -> (f64, f64) {
+    /// Moves the obstacles to their targets, and the body out of their way. The longest path asked for of one that is not far from the body and from the
+    /// device (pose of the reference point, and how far it moved, m), and how far the body went along with one, m.
+    pub(super) fn carry_obstacles(
+        &mut self,
+        device: &Pose,
+        device_moved: f64,
+        report: &mut StepReport,
+    ) -> (f64, f64) {
         let moved = self.obstacles.iter().any(PlacedObstacle::has_moved);
         for obstacle in &mut self.obstacles {
             obstacle.before = obstacle.pose;
@@ -99,7 +105,23 @@ impl GodObject {
         report.obstacles_blocked = u32::try_from(blocked).unwrap_or(u32::MAX);
         let distance = self.settings.activation_distance;
         self.collect(distance, &mut report.work);
+        self.note_far(device, device_moved);
+        let near = self.obstacles.iter().filter(|o| !o.far);
+        let asked = near.map(PlacedObstacle::way).fold(0.0, f64::max);
         (asked, went_along)
+    }
+
+    /// Until the next set the felt body is between here and where the device goes, and obstacles go as far again: what is farther away changes nothing.
+    fn note_far(&mut self, device: &Pose, device_moved: f64) {
+        let here = self.pose_at_reference_point();
+        let left = self.motion_length(&pose_difference(device, &here, &Vector3::zeros()));
+        let reach = self.settings.activation_distance + device_moved + left;
+        let center = Point3::from(here.translation.vector);
+        for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
+            let body = &self.world.body;
+            let off = shape::distance_at_least(body, &center, obstacle, &placed.pose);
+            placed.far = off > reach + placed.way(); // false for NaN
+        }
     }
 
     /// The body goes along with the obstacle that is nearest of those which may reach it: as one rigid body they need no search between them, and no row
@@ -221,7 +243,7 @@ impl GodObject {
     pub(super) fn longest_way(&self) -> f64 {
         let made =
             |o: &PlacedObstacle| o.length(&pose_difference(&o.pose, &o.before, &Vector3::zeros()));
-        let moving = self.obstacles.iter().filter(|o| o.has_moved());
+        let moving = self.obstacles.iter().filter(|o| o.has_moved() && !o.far);
         moving.map(made).fold(self.longest_way_left(), f64::max)
     }
 

@@ -45,14 +45,15 @@ impl<'a> Form<'a> {
         }
     }
 
-    fn distance(&self, point: &nalgebra::Point3<f64>) -> f64 {
+    /// Least distance of the form from a point, m, by its box where it is a mesh.
+    pub(super) fn distance(&self, point: &nalgebra::Point3<f64>) -> f64 {
         match self {
             Self::Mesh(mesh) => mesh.box_distance(point),
             Self::Primitive(primitive) => primitive.nearest(point).distance,
         }
     }
 
-    fn radius_about(&self, point: &nalgebra::Point3<f64>) -> f64 {
+    pub(super) fn radius_about(&self, point: &nalgebra::Point3<f64>) -> f64 {
         match self {
             Self::Mesh(mesh) => mesh.radius_bound_about(point),
             Self::Primitive(primitive) => primitive.radius_about(point),
