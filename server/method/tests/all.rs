@@ -44,6 +44,7 @@ mod support;
 mod surface_friction;
 mod surface_shading;
 mod surface_texture;
+mod taken_along;
 
 /// Counts by thread: a test that forbids allocation forbids its own.
 #[global_allocator]

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::geometry_shapes::{icosphere, mesh};
+use crate::geometry_shapes::{cuboid, icosphere, mesh};
+use crate::support::box_on_table;
 use god_object::collision::{
-    AdvancementSettings, CollisionWorkspace, Motion, Work, time_of_impact,
+    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
 };
 use god_object::nalgebra::{Matrix3, Point3, Vector3};
 use god_object::spatial::six;
@@ -130,7 +131,7 @@ fn forces_and_work_do_not_depend_on_the_order_of_the_obstacles() {
 }
 
 #[test]
-fn obstacles_far_away_change_no_force_and_cost_no_more_than_their_roots() {
+fn obstacles_far_away_change_no_force_and_cost_nothing() {
     let near = pebbles(0.03);
     let course = Course::among(near.clone());
     let far = pebbles(10.0);
@@ -142,15 +143,89 @@ fn obstacles_far_away_change_no_force_and_cost_no_more_than_their_roots() {
         };
         let other = Course::among(more);
         assert_eq!(course.off(&other), 0.0);
-        let (work, others) = (course.near_work(), other.near_work());
-        for (a, b) in work.into_iter().zip(others) {
-            assert!(alike(a, b), "{work:?} {others:?}");
-        }
-        // Each of them: one pair of volumes in each search and collection.
-        let most = 2 * u64::from(other.substeps + UPDATES) * PEBBLES as u64;
-        let added = other.work.node_pairs.saturating_sub(course.work.node_pairs);
-        assert!(added <= most, "{added} {most}");
+        assert_eq!(course.work, other.work);
     }
+}
+
+/// A ball that is swept about and turned far away, by 0.2 m in each update: the sets near by look no farther ahead for it, and what sticks stays.
+#[test]
+fn an_obstacle_that_moves_far_away_changes_nothing_near_by() {
+    for friction in [0.0, 0.5] {
+        let mut near = World::clone(&box_on_table());
+        near.obstacles[0].surface.friction = friction;
+        let mut both = near.clone();
+        both.obstacles.extend(pebbles(10.0).into_iter().take(1));
+        let settings = Settings::for_size(0.04);
+        let start = Pose::translation(0.0, 0.0, 0.03);
+        let mut led = [near, both]
+            .map(|world| GodObject::new(Arc::new(world), settings, start).expect("a free start"));
+        let far = led[1].obstacle_poses().last().copied().expect("a ball");
+        for update in 0..300 {
+            let u = f64::from(update);
+            let (aside, down) = ((u - 100.0).clamp(0.0, 100.0), u.min(100.0));
+            let device = Pose::translation(2e-6 * aside, 0.0, 0.03 - 2.2e-4 * down);
+            let swept = Vector3::new(0.2 * u.sin(), 0.0, 0.2 * u.cos());
+            led[1].move_obstacle(1, &(far * Pose::new(swept, Vector3::y() * u)));
+            for god_object in &mut led {
+                let report = god_object.step(&device, None);
+                assert_eq!(report.obstacles_blocked, 0);
+                let within = god_object.constraint_set().complete_within;
+                assert!(update < 250 || within < 1e-3, "{friction}: {within} m");
+            }
+        }
+        let [alone, beside] = led.map(|god_object| god_object.pose().translation.vector);
+        let off = (alone - beside).norm();
+        assert!(off < 0.1 * settings.rest_distance, "{friction}: {off} m");
+    }
+}
+
+/// The twin is out of reach, but the box about both pebbles holds the body: it is searched in full.
+#[test]
+fn what_a_motion_cannot_reach_is_free_to_a_full_search_and_costs_nothing() {
+    let bar = mesh(cuboid([0.05, 0.004, 0.003]));
+    let (vertices, triangles) = icosphere(6e-3, 1);
+    let twin = vertices.iter().map(|v| v - Vector3::repeat(10.0));
+    let after = vertices.len() as u32;
+    let of_twin = triangles.iter().map(|t| t.map(|v| v + after));
+    let both = mesh((
+        vertices.iter().copied().chain(twin).collect(),
+        triangles.iter().copied().chain(of_twin).collect(),
+    ));
+    let pebble = mesh((vertices, triangles));
+    let settings = AdvancementSettings::default();
+    let (mut left_alone, mut stopped) = (0, 0);
+    for k in 0..600 {
+        let u = f64::from(k);
+        let aside = Vector3::new(u.sin(), (1.7 * u).sin(), (2.3 * u).sin());
+        let out = aside.map(|x| 0.2 + x.abs()).normalize();
+        let distance = 0.02 + 0.1 * (0.37 * u).sin().abs();
+        let at = Pose::new(out * distance, Vector3::zeros());
+        let motion = Motion {
+            start: Pose::rotation(aside * 2.0),
+            displacement: six(&(out * 0.02), &(aside.yzx() * 3.0)),
+            reference_point: Point3::new(0.01, 0.0, 0.0),
+        };
+        let [(found, work), (expected, full)] = [&pebble, &both].map(|obstacle| {
+            let (mut workspace, mut work) = (CollisionWorkspace::new(), Work::default());
+            let found = time_of_impact(
+                &bar,
+                &motion,
+                obstacle,
+                &at,
+                &settings,
+                &mut workspace,
+                &mut work,
+            );
+            (found, work)
+        });
+        assert!(full.node_pairs > 0);
+        if work == Work::default() {
+            assert_eq!([found, expected], [TimeOfImpact::Separated; 2], "{k}");
+            left_alone += 1;
+        }
+        stopped += u32::from(matches!(expected, TimeOfImpact::Impact { .. }));
+    }
+    assert!(left_alone > 200 && stopped > 40, "{left_alone} {stopped}");
 }
 
 #[test]

@@ -35,7 +35,7 @@ fn loops(world: &Arc<World>) -> (GodObject, Coupling, Settings) {
 }
 
 /// Independent of the method's collision code: every pair of triangles where everything is now.
-fn overlaps(world: &World, god_object: &GodObject) -> bool {
+pub(crate) fn overlaps(world: &World, god_object: &GodObject) -> bool {
     let mut now = world.clone();
     for (obstacle, pose) in now.obstacles.iter_mut().zip(god_object.obstacle_poses()) {
         obstacle.pose = *pose;
@@ -284,51 +284,6 @@ fn a_blade_that_turns_takes_the_body_along() {
         assert!(in_blade.y > 0.0, "passed through at {angle}: {in_blade}");
     }
     assert_eq!(blocked, 0);
-}
-
-/// A turntable under the body, and a fence along a radius that ends inside the arc on which the body would ride round.
-#[test]
-fn a_turntable_without_friction_carries_no_body_past_the_end_of_a_fence() {
-    let mut fence = box_obstacle("fence", Vector3::new(0.039, 1e-3, 0.02), Vector3::zeros());
-    let along = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_4);
-    let middle = along * Vector3::new(0.039, 0.0, 0.021);
-    fence.pose = Pose::from_parts(middle.into(), along);
-    let world = Arc::new(World {
-        body: box_body(Vector3::new(0.01, 0.01, 0.01)),
-        obstacles: vec![
-            box_obstacle(
-                "table",
-                Vector3::new(0.3, 0.3, 5e-3),
-                Vector3::new(0.0, 0.0, -5e-3),
-            ),
-            fence,
-        ],
-    });
-    let settings = Settings::for_size(0.02);
-    for degrees in [1.0_f64, 10.0, 45.0, 90.0] {
-        let start = Pose::translation(0.1, 0.0, 0.011);
-        let mut god_object = GodObject::new(world.clone(), settings, start).expect("a free start");
-        // A hand that stands and presses the body onto the table by 1 mm.
-        let device = Pose::translation(0.1, 0.0, 9e-3);
-        for _ in 0..20 {
-            god_object.step(&device, None);
-        }
-        let mut turned: f64 = 0.0;
-        while turned < 90.0 {
-            turned += degrees;
-            let turn = Vector3::z() * turned.to_radians();
-            god_object.move_obstacle(0, &Pose::new(Vector3::new(0.0, 0.0, -5e-3), turn));
-            let report = god_object.step(&device, None);
-            assert_eq!(report.obstacles_blocked, 0, "{degrees} at {turned}");
-            assert!(!overlaps(&world, &god_object));
-        }
-        for _ in 0..50 {
-            god_object.step(&device, None);
-        }
-        let place = god_object.pose().translation.vector;
-        let off = (place - device.translation.vector).xy().norm();
-        assert!(off < 1e-4, "{degrees} degrees at a time: {place}");
-    }
 }
 
 const CLEARANCE: f64 = 1e-4;

@@ -87,6 +87,38 @@ proptest! {
 }
 
 #[test]
+fn what_is_out_of_reach_costs_nothing() {
+    let pairs = [
+        (Form::Cube(0.02), Form::Sphere(0.01)),
+        (Form::Sphere(0.01), Form::Cube(0.02)),
+        (Form::Capsule(0.01, 0.02), Form::Cylinder(0.01, 0.02)),
+        (Form::Cube(0.02), Form::Plane),
+    ];
+    let motion = Motion {
+        start: Pose::translation(0.0, 0.0, 0.2),
+        displacement: six(
+            &Vector3::new(0.05, 0.02, -0.03),
+            &Vector3::new(1.0, -2.0, 3.0),
+        ),
+        reference_point: Point3::origin(),
+    };
+    for (form, obstacle) in pairs {
+        let mut work = Work::default();
+        let found = shape::time_of_impact(
+            &form.body(),
+            &motion,
+            &obstacle.obstacle("obstacle", Pose::identity()),
+            &Pose::identity(),
+            &SETTINGS,
+            &mut CollisionWorkspace::new(),
+            &mut work,
+        );
+        let expected = (TimeOfImpact::Separated, Work::default());
+        assert_eq!((found, work), expected, "{form:?} and {obstacle:?}");
+    }
+}
+
+#[test]
 fn a_sphere_stops_at_the_closed_form_over_a_plane() {
     let pose = Pose::identity();
     let start = Pose::translation(0.1, -0.3, 0.05);

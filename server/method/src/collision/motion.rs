@@ -11,6 +11,7 @@
 
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
+use crate::geometry::Mesh;
 use crate::spatial::{Pose, Vector6, advance_pose, angular, linear};
 
 /// Straight line for the reference point, constant axis and rate for the rotation, over t in [0, 1].
@@ -61,6 +62,12 @@ impl Placement {
     /// Bound on how far any point of a body with this radius about G is from its place at `other`, m.
     pub(super) fn distance_to(&self, other: &Self, radius: f64) -> f64 {
         (self.center - other.center).norm() + (self.rotation - other.rotation).norm() * radius
+    }
+
+    /// Whether the body there is farther than `gap` (m) from the obstacle, by the ball about its box and by the obstacle's box.
+    pub(crate) fn is_beyond(&self, gap: f64, body: &Mesh, obstacle: &Mesh) -> bool {
+        let all = &body.tree().nodes()[0];
+        obstacle.box_distance(&self.point(&all.center)) - all.radius > gap // false for NaN
     }
 
     /// The obstacle as seen from the body, about its origin.
@@ -143,6 +150,18 @@ impl RelativeMotion {
     /// Bound on the path of the body's fastest point, given its radius about G, m.
     pub(crate) fn length(&self, radius: f64) -> f64 {
         self.velocity.norm() + self.rate * radius
+    }
+
+    /// Whether the body, given its radius about G, stays farther than `gap` (m) from an obstacle that is `distance` (m) from a point, at least: G goes
+    /// straight, and however the body turns, its points stay within the radius of G.
+    pub(crate) fn stays_beyond(
+        &self,
+        gap: f64,
+        radius: f64,
+        distance: impl FnOnce(&Point3<f64>) -> f64,
+    ) -> bool {
+        let least = distance(&Point3::from(self.start)) - self.velocity.norm() - radius;
+        least > gap // false for NaN
     }
 
     /// Largest coordinate that the body or the motion reaches, given its radius about G, m. Rounding is relative to it.

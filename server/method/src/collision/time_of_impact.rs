@@ -88,6 +88,11 @@ pub fn time_of_impact(
         relative: &relative,
         settings,
     };
+    // What is far away is left alone before its tree is touched.
+    if relative.stays_beyond(search.gaps.stop, radius, |g| obstacle.box_distance(g)) {
+        problem.note_apart(&search, 1.0, workspace);
+        return TimeOfImpact::Separated;
+    }
     if problem.crosses_at_start(radius, workspace, work) {
         return TimeOfImpact::Overlapping;
     }
@@ -101,11 +106,7 @@ pub fn time_of_impact(
                     TimeOfImpact::Impact { time } | TimeOfImpact::IterationLimit { time } => time,
                     TimeOfImpact::Overlapping => return answer,
                 };
-                let kept = current.gaps.stop - current.gaps.slack;
-                workspace
-                    .memory_mut()
-                    .apart
-                    .remember(problem.key(), &relative, until, kept);
+                problem.note_apart(&current, until, workspace);
                 return answer;
             }
             // Nearer than the gap to stop at already: keep what there is, so that sliding and leaving stay free.
@@ -160,6 +161,13 @@ impl Problem<'_> {
 
     fn key(&self) -> [u64; 2] {
         [self.body.identity(), self.obstacle.identity()]
+    }
+
+    /// Remembers that the surfaces stay apart by the gap of a search up to a time.
+    fn note_apart(&self, search: &PairSearch, until: f64, workspace: &mut CollisionWorkspace) {
+        let kept = search.gaps.stop - search.gaps.slack;
+        let apart = &mut workspace.memory_mut().apart;
+        apart.remember(self.key(), self.relative, until, kept);
     }
 
     /// The earliest impact; `Err` with the distance when some pair is nearer than the gap to stop at from the beginning.

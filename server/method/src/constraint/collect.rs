@@ -64,6 +64,11 @@ pub(crate) fn collect_bounded(
     work: &mut Work,
 ) -> Collected {
     let placement = Placement::of(body_pose, obstacle_pose);
+    if placement.is_beyond(activation_distance, body, obstacle) {
+        workspace.candidates.clear();
+        note_witnesses(body, workspace);
+        return Collected::nothing_within(activation_distance);
+    }
     let trees = (body.wide_tree(), obstacle.wide_tree());
     let volumes = FacingVolumes::still(
         trees,
@@ -112,20 +117,25 @@ pub(crate) fn collect_bounded(
     if truncated {
         complete_within = complete_within.min(candidates.last().map_or(0.0, |c| c.gap));
     }
-    let witnesses = &mut workspace.memories[workspace.current].witnesses;
-    witnesses.clear();
-    for contact in candidates.iter().take(MAX_WITNESSES) {
-        if let Some(triangle) = triangle_of(body, contact.features.on_body) {
-            witnesses.push((triangle, contact.obstacle_triangle));
-        }
-    }
     let gap_min = candidates.first().map_or(f64::INFINITY, |c| c.gap);
     out.extend(candidates.iter().map(|c| in_world(c, obstacle_pose)));
+    note_witnesses(body, workspace);
     Collected {
         truncated,
         complete_within,
         looked_at,
         gap_min,
+    }
+}
+
+/// The next search looks at the nearest candidates first.
+fn note_witnesses(body: &Mesh, workspace: &mut CollisionWorkspace) {
+    let witnesses = &mut workspace.memories[workspace.current].witnesses;
+    witnesses.clear();
+    for contact in workspace.candidates.iter().take(MAX_WITNESSES) {
+        if let Some(triangle) = triangle_of(body, contact.features.on_body) {
+            witnesses.push((triangle, contact.obstacle_triangle));
+        }
     }
 }
 

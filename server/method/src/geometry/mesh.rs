@@ -167,6 +167,14 @@ impl Mesh {
         (point - low).abs().sup(&(high - point).abs()).norm()
     }
 
+    /// Distance of the bounding box from `point`, m, which no vertex is nearer than; none inside the box.
+    #[inline]
+    pub(crate) fn box_distance(&self, point: &Point3<f64>) -> f64 {
+        let [low, high] = &self.bounding_box;
+        let outside = (low - point).sup(&(point - high));
+        outside.sup(&Vector3::zeros()).norm()
+    }
+
     /// Greatest distance of a vertex from `point`, m.
     pub fn radius_about(&self, point: &Point3<f64>) -> f64 {
         self.vertices

@@ -58,7 +58,8 @@ impl GodObject {
     /// The obstacles have moved, and the body, which was at `start` (pose of the reference point), has made room.
     pub(super) fn begin_carry(&mut self, start: &Pose) {
         self.carry = Carry::default();
-        let rough = self.friction.is_some() && self.obstacles.iter().any(PlacedObstacle::has_moved);
+        let moved = |placed: &PlacedObstacle| placed.has_moved() && !placed.far;
+        let rough = self.friction.is_some() && self.obstacles.iter().any(moved);
         if rough {
             let here = self.pose_at_reference_point();
             self.carry = Carry {

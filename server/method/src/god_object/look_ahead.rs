@@ -9,7 +9,7 @@ use super::substep::Update;
 const LOOK_AHEAD_SHRINKS: f64 = 0.5;
 const LOOK_AHEAD_GROWS: f64 = 1.25;
 /// The paper's cone has touching contacts only: gaps up to this many rest distances touch.
-const TOUCHING_REST_DISTANCES: f64 = 2.0;
+pub(super) const TOUCHING_REST_DISTANCES: f64 = 2.0;
 
 impl GodObject {
     /// The body's fastest point at the device may be up to `distance` (m) from where the device pose of the next updates puts it, by the

@@ -13,10 +13,12 @@
 //!
 //! Before that, the body goes along with the obstacle that is nearest, as one rigid body with it, as far as that is free of the others; from there the
 //! hand leads it back. So a body in a part that moves does what it does in one that stands, with the same rows, and is searched for impact no more often.
-//! It stays where the obstacle slides past it without friction: in a late update it would be taken round what the hand does not lead it back about.
+//! It stays where the obstacle slides past it without friction, draws back or does not reach it: in a late update it would be taken round what the hand
+//! does not lead it back about.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
+use super::look_ahead::TOUCHING_REST_DISTANCES;
 use super::placed_obstacle::{Ahead, PlacedObstacle};
 use super::{GodObject, StepReport};
 use crate::collision::{Motion, TimeOfImpact};
@@ -56,8 +58,14 @@ impl GodObject {
         usable
     }
 
-    /// Moves the obstacles to their targets, and the body out of their way. The longest path asked for, and how far the body went along with one, m.
-    pub(super) fn carry_obstacles(&mut self, report: &mut StepReport) -> (f64, f64) {
+    /// Moves the obstacles to their targets, and the body out of their way. The longest path asked for of one that is not far from the body and from the
+    /// device (pose of the reference point, and how far it moved, m), and how far the body went along with one, m.
+    pub(super) fn carry_obstacles(
+        &mut self,
+        device: &Pose,
+        device_moved: f64,
+        report: &mut StepReport,
+    ) -> (f64, f64) {
         let moved = self.obstacles.iter().any(PlacedObstacle::has_moved);
         for obstacle in &mut self.obstacles {
             obstacle.before = obstacle.pose;
@@ -97,7 +105,23 @@ impl GodObject {
         report.obstacles_blocked = u32::try_from(blocked).unwrap_or(u32::MAX);
         let distance = self.settings.activation_distance;
         self.collect(distance, &mut report.work);
+        self.note_far(device, device_moved);
+        let near = self.obstacles.iter().filter(|o| !o.far);
+        let asked = near.map(PlacedObstacle::way).fold(0.0, f64::max);
         (asked, went_along)
+    }
+
+    /// Until the next set the felt body is between here and where the device goes, and obstacles go as far again: what is farther away changes nothing.
+    fn note_far(&mut self, device: &Pose, device_moved: f64) {
+        let here = self.pose_at_reference_point();
+        let left = self.motion_length(&pose_difference(device, &here, &Vector3::zeros()));
+        let reach = self.settings.activation_distance + device_moved + left;
+        let center = Point3::from(here.translation.vector);
+        for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
+            let body = &self.world.body;
+            let off = shape::distance_at_least(body, &center, obstacle, &placed.pose);
+            placed.far = off > reach + placed.way(); // false for NaN
+        }
     }
 
     /// The body goes along with the obstacle that is nearest of those which may reach it: as one rigid body they need no search between them, and no row
@@ -157,35 +181,43 @@ impl GodObject {
         nearest.map(|(_, placed)| *placed)
     }
 
-    /// Whether one of the obstacles that make the mover's motion does more than slide past the body without friction, which leaves it in the hand.
+    /// Whether the obstacles that make the mover's motion hold the body, or one of them would run into it. What slides past it, draws back or comes near
+    /// leaves it in the hand.
     fn is_taken_along(&mut self, mover: &PlacedObstacle, report: &mut StepReport) -> bool {
+        if self.is_held_by(mover) {
+            return true;
+        }
         for index in 0..self.obstacles.len() {
             let placed = self.obstacles[index];
-            if !placed.goes_with(mover) {
-                continue;
-            }
-            let rough = self.world.obstacles[index].surface.friction > 0.0;
-            if rough || !self.slides_past(index) {
-                return true;
-            }
-            let (_, time) = self.free_way(index, &placed.left(), report);
-            if time < 1.0 {
+            if placed.goes_with(mover) && self.free_way(index, &placed.left(), report).1 < 1.0 {
                 return true;
             }
         }
         false
     }
 
-    /// Whether no row of an obstacle becomes shorter or longer by the way that it has left.
-    fn slides_past(&self, index: usize) -> bool {
-        let placed = &self.obstacles[index];
-        let motion = placed.target * placed.pose.inverse();
-        let rows = self.set.constraints.iter();
-        let mut rows = rows.filter(|row| usize::from(row.features.obstacle) == index);
-        rows.all(|row| {
-            let way = row.normal.dot(&(motion * row.point - row.point));
-            way.abs() <= self.settings.motion_tolerance // false for NaN
-        })
+    /// Whether the obstacles that make the mover's motion push the body, hold it by friction, or have it between what comes and what draws back.
+    fn is_held_by(&self, mover: &PlacedObstacle) -> bool {
+        let (rest, tolerance) = (self.settings.rest_distance, self.settings.motion_tolerance);
+        let (mut comes, mut draws_back) = (false, false);
+        for (index, placed) in self.obstacles.iter().enumerate() {
+            if !placed.goes_with(mover) {
+                continue;
+            }
+            let motion = placed.target * placed.pose.inverse();
+            let rough = self.world.obstacles[index].surface.friction > 0.0;
+            let rows = self.set.constraints.iter();
+            for row in rows.filter(|row| usize::from(row.features.obstacle) == index) {
+                let way = row.normal.dot(&(motion * row.point - row.point));
+                let free = way <= tolerance || row.gap - way >= rest; // false for NaN
+                if !free || (rough && row.gap <= TOUCHING_REST_DISTANCES * rest) {
+                    return true;
+                }
+                comes |= way > tolerance;
+                draws_back |= way < -tolerance;
+            }
+        }
+        comes && draws_back
     }
 
     /// A half-space has no farthest point: what counts is the part that the body can reach.
@@ -211,7 +243,7 @@ impl GodObject {
     pub(super) fn longest_way(&self) -> f64 {
         let made =
             |o: &PlacedObstacle| o.length(&pose_difference(&o.pose, &o.before, &Vector3::zeros()));
-        let moving = self.obstacles.iter().filter(|o| o.has_moved());
+        let moving = self.obstacles.iter().filter(|o| o.has_moved() && !o.far);
         moving.map(made).fold(self.longest_way_left(), f64::max)
     }
 

@@ -18,6 +18,8 @@ pub(super) struct PlacedObstacle {
     pub(super) target: Pose,
     /// Its motion of this update, as far as it made it, is the body's, too.
     pub(super) with_body: bool,
+    /// It comes near neither the body nor the hand, also if it goes as far again as in this update.
+    pub(super) far: bool,
     /// World from obstacle where the body makes room for it next: a share of its way.
     pub(super) next: Pose,
     /// Radius of the mesh about its origin, m; of a half-space that of what can touch the body.
@@ -31,6 +33,7 @@ impl PlacedObstacle {
             before: obstacle.pose,
             target: obstacle.pose,
             with_body: false,
+            far: false,
             next: obstacle.pose,
             radius: obstacle.mesh.radius_about(&Point3::origin()),
         }
@@ -85,6 +88,15 @@ impl PlacedObstacle {
         } else {
             0.0
         }
+    }
+
+    /// Bound on the whole way of its fastest point in this update, m.
+    pub(super) fn way(&self) -> f64 {
+        if self.target == self.before {
+            return 0.0;
+        }
+        let whole = pose_difference(&self.target, &self.before, &Vector3::zeros());
+        self.length(&whole)
     }
 
     /// Bound on the path of its fastest point over a displacement, m.

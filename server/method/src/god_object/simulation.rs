@@ -184,19 +184,19 @@ impl GodObject {
         let device_moved = self.motion_length(&self.device_step) + self.device_ahead;
 
         // What moves by itself comes first: the body is out of its way before it follows the hand.
-        let (obstacles_moved, went_along) = self.carry_obstacles(&mut report);
+        let (obstacle_way, went_along) = self.carry_obstacles(&device, device_moved, &mut report);
         self.begin_carry(&start);
 
         // Where the hand rests, an update that turns back on the last says that the last went too far: sub-steps make the whole way to their goal,
         // so the goal is what comes nearer.
-        if device_moved + obstacles_moved > self.settings.rest_distance {
+        if device_moved + obstacle_way > self.settings.rest_distance {
             self.rest_memory = StepMemory::default();
         }
         let unconstrained = unconstrained * self.rest_memory.damping();
         let goal = advance_pose(&start, &unconstrained, 1.0);
 
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
-        let all_moved = device_moved + obstacles_moved;
+        let all_moved = device_moved + obstacle_way;
         let mut update = Update {
             all_moved,
             moved: all_moved - self.device_ahead,

@@ -34,7 +34,7 @@ const FAST_GROWTH: f64 = 8.0;
 /// What the sub-steps of one update hand on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Update {
-    /// Path of the device and of the fastest obstacle since the last update, m: they may move as far again until the next.
+    /// Path of the device and of the fastest obstacle that is near, since the last update, m: they may move as far again until the next.
     pub(super) all_moved: f64,
     /// Of that, what is known by its pose; not how much farther than that the device may be.
     pub(super) moved: f64,

@@ -87,6 +87,19 @@ pub fn time_of_impact(
     )
 }
 
+/// Bound on how far a body is from an obstacle at least, m, with its reference point at `center`, world, and however it is turned.
+pub(crate) fn distance_at_least(
+    body: &Body,
+    center: &Point3<f64>,
+    obstacle: &Obstacle,
+    obstacle_pose: &Pose,
+) -> f64 {
+    let held = Form::of(&body.mesh, body.primitive.as_ref());
+    let other = Form::of(&obstacle.mesh, obstacle.primitive.as_ref());
+    let center = obstacle_pose.inverse_transform_point(center);
+    other.distance(&center) - held.radius_about(&body.reference_point)
+}
+
 /// The way of an obstacle to a pose while the body stands.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum ObstacleWay {

@@ -45,7 +45,15 @@ impl<'a> Form<'a> {
         }
     }
 
-    fn radius_about(&self, point: &nalgebra::Point3<f64>) -> f64 {
+    /// Least distance of the form from a point, m, by its box where it is a mesh.
+    pub(super) fn distance(&self, point: &nalgebra::Point3<f64>) -> f64 {
+        match self {
+            Self::Mesh(mesh) => mesh.box_distance(point),
+            Self::Primitive(primitive) => primitive.nearest(point).distance,
+        }
+    }
+
+    pub(super) fn radius_about(&self, point: &nalgebra::Point3<f64>) -> f64 {
         match self {
             Self::Mesh(mesh) => mesh.radius_bound_about(point),
             Self::Primitive(primitive) => primitive.radius_about(point),
@@ -80,6 +88,9 @@ pub(super) fn time_of_impact(
         gaps: Gaps::new(settings.minimum_gap, settings.gap_tolerance, slack),
         max_iterations: settings.max_iterations,
     };
+    if relative.stays_beyond(search.gaps.stop, radius, |g| obstacle.distance(g)) {
+        return TimeOfImpact::Separated;
+    }
     let problem = Problem {
         body,
         obstacle,

@@ -21,6 +21,7 @@ pub struct Counted {
 }
 
 impl Counted {
+    /// At the scene's start, which has to be free.
     pub fn new(scene: &Scene) -> Self {
         let simulation = GodObject::new(scene.world.clone(), scene.settings, scene.start)
             .unwrap_or_else(|error| panic!("{error}"));

@@ -17,6 +17,7 @@ pub struct GodObjectMethod {
 }
 
 impl GodObjectMethod {
+    /// At the scene's start, which has to be free.
     pub fn new(scene: &Scene, settings: &Settings) -> Self {
         let simulation = GodObject::new(scene.world.clone(), *settings, scene.start)
             .unwrap_or_else(|error| panic!("{error}"));
