@@ -48,10 +48,19 @@ fn off_after(world: &Arc<World>, [start, hand]: [&Pose; 2], turns: &[f64]) -> f6
     (place - hand.translation.vector).xy().norm()
 }
 
-/// Pressed by 1 mm on a smooth table, and held just above a rough one.
+/// Height over a table, or distance from a door, at which a body touches without a load, m: between one rest distance and two.
+const LAID_ON: f64 = 3e-6;
+
+/// Pressed by 1 mm on a smooth table, held just above a rough one, and laid on it without a load.
 #[test]
 fn a_turntable_that_does_not_hold_carries_no_body_behind_a_fence() {
-    for (friction, start, hand) in [(0.0, 0.011, 9e-3), (0.5, 0.01005, 0.01005)] {
+    let laid_on = 0.01 + LAID_ON;
+    let cases = [
+        (0.0, 0.011, 9e-3),
+        (0.5, 0.01005, 0.01005),
+        (0.5, laid_on, laid_on),
+    ];
+    for (friction, start, hand) in cases {
         let mut table = box_obstacle(
             "table",
             Vector3::new(0.3, 0.3, 5e-3),
@@ -88,13 +97,18 @@ fn door(degrees: f64, fence: Obstacle) -> Arc<World> {
     })
 }
 
+/// A smooth door beside the body, and a rough one that touches it.
 #[test]
 fn a_door_that_swings_away_carries_no_body_behind_a_fence() {
-    let world = door(0.0, fence(0.078, 4e-3, 6e-3, -45.0));
-    let hand = Pose::translation(0.1, 0.01105, 0.0);
-    for step in [-1.0, -10.0, -45.0, -90.0] {
-        let off = off_after(&world, [&hand, &hand], &quarter(step));
-        assert!(off < 1e-4, "by {step} degrees: {off}");
+    for (friction, gap) in [(0.0, 5e-5), (0.5, LAID_ON)] {
+        let mut world = World::clone(&door(0.0, fence(0.078, 4e-3, 6e-3, -45.0)));
+        world.obstacles[0].surface.friction = friction;
+        let world = Arc::new(world);
+        let hand = Pose::translation(0.1, 0.011 + gap, 0.0);
+        for step in [-1.0, -10.0, -45.0, -90.0] {
+            let off = off_after(&world, [&hand, &hand], &quarter(step));
+            assert!(off < 1e-4, "friction {friction}, by {step} degrees: {off}");
+        }
     }
 }
 

@@ -1,9 +1,11 @@
 //! How far a published set looks ahead, and what that may cost: late updates must not make later ones still later.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::GodObject;
 use super::substep::Update;
+use crate::shape;
+use crate::spatial::{Pose, pose_difference};
 
 /// How much shorter a look-ahead becomes that costs too much, and how much longer one that costs little.
 const LOOK_AHEAD_SHRINKS: f64 = 0.5;
@@ -43,6 +45,19 @@ impl GodObject {
             self.settings.activation_distance + update.look_ahead.min(self.affordable)
         } else {
             TOUCHING_REST_DISTANCES * self.settings.rest_distance
+        }
+    }
+
+    /// Until the next set the felt body is between here and where the device goes, and obstacles go as far again: what is farther away changes nothing.
+    pub(super) fn note_far(&mut self, device: &Pose, device_moved: f64) {
+        let here = self.pose_at_reference_point();
+        let left = self.motion_length(&pose_difference(device, &here, &Vector3::zeros()));
+        let reach = self.settings.activation_distance + device_moved + left;
+        let center = Point3::from(here.translation.vector);
+        for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
+            let body = &self.world.body;
+            let off = shape::distance_at_least(body, &center, obstacle, &placed.pose);
+            placed.far = off > reach + placed.way(); // false for NaN
         }
     }
 

@@ -13,10 +13,10 @@
 //!
 //! Before that, the body goes along with the obstacle that is nearest, as one rigid body with it, as far as that is free of the others; from there the
 //! hand leads it back. So a body in a part that moves does what it does in one that stands, with the same rows, and is searched for impact no more often.
-//! It stays where the obstacle slides past it without friction, draws back or does not reach it: in a late update it would be taken round what the hand
-//! does not lead it back about.
+//! It stays where the obstacle slides past it without friction or load, draws back or does not reach it: in a late update it would be taken round what
+//! the hand does not lead it back about.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::look_ahead::TOUCHING_REST_DISTANCES;
 use super::placed_obstacle::{Ahead, PlacedObstacle};
@@ -111,19 +111,6 @@ impl GodObject {
         (asked, went_along)
     }
 
-    /// Until the next set the felt body is between here and where the device goes, and obstacles go as far again: what is farther away changes nothing.
-    fn note_far(&mut self, device: &Pose, device_moved: f64) {
-        let here = self.pose_at_reference_point();
-        let left = self.motion_length(&pose_difference(device, &here, &Vector3::zeros()));
-        let reach = self.settings.activation_distance + device_moved + left;
-        let center = Point3::from(here.translation.vector);
-        for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
-            let body = &self.world.body;
-            let off = shape::distance_at_least(body, &center, obstacle, &placed.pose);
-            placed.far = off > reach + placed.way(); // false for NaN
-        }
-    }
-
     /// The body goes along with the obstacle that is nearest of those which may reach it: as one rigid body they need no search between them, and no row
     /// changes. From there the sub-steps lead it to where the hand wants it. How far it went, m.
     fn go_along(&mut self, report: &mut StepReport) -> f64 {
@@ -196,9 +183,12 @@ impl GodObject {
         false
     }
 
-    /// Whether the obstacles that make the mover's motion push the body, hold it by friction, or have it between what comes and what draws back.
+    /// Whether the obstacles that make the mover's motion push the body, hold it by friction, as they do while the hand presses it on where they go, or
+    /// have it between what comes and what draws back.
     fn is_held_by(&self, mover: &PlacedObstacle) -> bool {
         let (rest, tolerance) = (self.settings.rest_distance, self.settings.motion_tolerance);
+        let here = self.pose_at_reference_point();
+        let to_hand = self.last_device.unwrap_or(here) * here.inverse();
         let (mut comes, mut draws_back) = (false, false);
         for (index, placed) in self.obstacles.iter().enumerate() {
             if !placed.goes_with(mover) {
@@ -208,9 +198,15 @@ impl GodObject {
             let rough = self.world.obstacles[index].surface.friction > 0.0;
             let rows = self.set.constraints.iter();
             for row in rows.filter(|row| usize::from(row.features.obstacle) == index) {
-                let way = row.normal.dot(&(motion * row.point - row.point));
+                let there = motion * row.point;
+                let way = row.normal.dot(&(there - row.point));
                 let free = way <= tolerance || row.gap - way >= rest; // false for NaN
-                if !free || (rough && row.gap <= TOUCHING_REST_DISTANCES * rest) {
+                let loaded = || {
+                    let at_hand = to_hand * (row.point + row.normal * row.gap);
+                    row.normal.dot(&(at_hand - there)) < rest - tolerance
+                };
+                let touches = row.gap <= TOUCHING_REST_DISTANCES * rest;
+                if !free || (rough && touches && loaded()) {
                     return true;
                 }
                 comes |= way > tolerance;
