@@ -91,15 +91,14 @@ mod tests {
             "enabled = false\nport = 4861",
             "enabled = true\ntoken_file = \"none.token\"\nport = 4861",
         );
-        for (change, line, expected) in [
-            (path, 80, "./none.csv: cannot be opened"),
-            (strings, 83, "./none.toml"),
-            (
-                token,
-                142,
-                "cannot use the token of [operator] in ./none.token",
-            ),
+        let unread = "cannot use the token of [operator] in ./none.token";
+        for (change, further, expected) in [
+            (path, 0, "./none.csv: cannot be opened"),
+            (strings, 0, "./none.toml"),
+            (token, 1, unread),
         ] {
+            let at = SHIPPED_WORKBENCH.find(change.0).expect("a part of it");
+            let line = SHIPPED_WORKBENCH[..at].lines().count() + 1 + further;
             let told = faults("", &[change]);
             let [told] = &told[..] else {
                 panic!("{told:?}");
