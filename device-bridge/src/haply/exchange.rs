@@ -64,7 +64,7 @@ pub struct Exchange {
     settings: ExchangeSettings,
     arm: Option<String>,
     grip: Option<(GripKind, String)>,
-    /// Messages said in this connection with an arm known.
+    /// Messages said in this connection with the arm there.
     said: u32,
     other_basis: bool,
     state: ArmState,
@@ -72,7 +72,7 @@ pub struct Exchange {
     text: String,
 }
 
-/// The message, counted with the arm known, from which the configuration counts that was asked for in the first.
+/// The message, counted with the arm there, from which the configuration counts that was asked for in the first.
 const CONFIGURED: u32 = 2;
 
 impl Exchange {
@@ -208,20 +208,20 @@ impl Exchange {
     /// The next message. `force` (N, the device's axes) goes out only while the device may be used; without one its motors go idle.
     pub fn say(&mut self, force: Option<[f64; 3]>) -> &str {
         let arm = self.arm.as_deref();
-        let first = arm.is_some() && self.said == 0;
+        // One that is not there yet is configured when it comes.
+        let is_there = arm.is_some() && self.unusable != Some(Unusable::NotPlugged);
+        let first = is_there && self.said == 0;
         let say = Say {
             profile: first.then_some(self.settings.profile.as_str()),
-            // With the arm unknown until it is there; and once the configuration should hold, to see whether it does.
-            full: arm.is_none()
-                || self.said == CONFIGURED
-                || self.unusable == Some(Unusable::NotPlugged),
+            // Until the arm is there; and once the configuration should hold, to see whether it does.
+            full: !is_there || self.said == CONFIGURED,
             arm,
             set_basis: first,
             force: force.filter(|_| self.unusable.is_none()),
             grip: self.grip.as_ref().map(|(kind, id)| (*kind, id.as_str())),
         };
         say.write(&mut self.text);
-        if arm.is_some() {
+        if is_there {
             self.said = self.said.saturating_add(1);
         }
         &self.text
@@ -260,11 +260,13 @@ mod tests {
         assert_eq!(exchange.unusable(), Some(Unusable::NoService));
         let other_arm = heard(&mut exchange, &["B"], &["1"]);
         assert_eq!(other_arm, Some(Unusable::NotPlugged));
+        assert!(!exchange.say(None).contains("configure"), "it is not there");
         let other_grip = heard(&mut exchange, &["B", "A"], &["2"]);
         assert_eq!(other_grip, Some(Unusable::NoGrip));
         assert_eq!(heard(&mut exchange, &["B", "A"], &["2", "1"]), None);
         let said = exchange.say(Some([1.0, 0.0, 0.0]));
         let pushed = r#""device_id":"A","commands":{"set_cursor_force""#;
         assert!(said.contains(pushed), "{said}");
+        assert!(said.contains(PERMUTATION), "its axes are set now: {said}");
     }
 }

@@ -59,7 +59,7 @@ pub(crate) fn start(path: &str, priority: u8) -> Result<ArmThread, PolhemError> 
         judge: Counters::new(JUDGED.0),
         before: None,
         buffer: Vec::with_capacity(MAX_BUFFER),
-        line_bytes: LINE_BYTES,
+        line_bytes: None,
     };
     let thread = WireThread::start("taut-polhem", priority, serial);
     thread.map_err(|error| PolhemError::Thread(error.to_string()))
@@ -86,8 +86,8 @@ struct Serial {
     /// Position and time of the line believed before, for the velocity.
     before: Option<([f64; 3], Duration)>,
     buffer: Vec<u8>,
-    /// Bytes of the board's lines; those to it have as many.
-    line_bytes: usize,
+    /// Bytes of the board's lines, once they are known; those to it have as many.
+    line_bytes: Option<usize>,
 }
 
 impl Wire for Serial {
@@ -123,6 +123,7 @@ impl Serial {
 
     fn turn(&mut self, port: &mut Port, line: &mut ArmLine) -> std::io::Result<()> {
         self.buffer.clear();
+        self.line_bytes = None;
         let mut believed = monotonic_now();
         let mut ticker = Ticker::at_phase(PERIOD, PHASE);
         while !line.is_over() {
@@ -147,7 +148,7 @@ impl Serial {
     }
 
     fn say(&self, port: &mut Port, force: &[f64; 3]) -> std::io::Result<()> {
-        if self.line_bytes == LINE_BYTES {
+        if self.line_bytes.is_none_or(|bytes| bytes == LINE_BYTES) {
             port.write_all(&force_frame(force))
         } else {
             port.write_all(&short_force_frame(force))
@@ -163,14 +164,11 @@ impl Serial {
             Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
             Err(error) => return Err(error),
         }
-        let newest = Frame::newest(&mut self.buffer);
+        let newest = Frame::newest(&mut self.buffer, &mut self.line_bytes);
         if self.buffer.len() > MAX_BUFFER {
             self.buffer.clear();
         }
-        Ok(newest.map(|(frame, bytes)| {
-            self.line_bytes = bytes;
-            frame
-        }))
+        Ok(newest)
     }
 
     /// Whether the frame is believed; if so it is handed on.

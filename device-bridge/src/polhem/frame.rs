@@ -7,7 +7,7 @@
 //!
 //! The orientation is Rz(tA) Ry(-lambda) Rx(tD) Ry(tE). There is no checksum: a line counts only if it has its bytes and eight numbers in range.
 //!
-//! Lines of 63 bytes with one end, which the published program has as well, are understood, too; such a board is answered in lines of 63 bytes.
+//! Lines of micro API 0.1 have 63 bytes. Two lines in a row tell which a board has, and it is answered in as many.
 //!
 //! Source: `haptikfabrikenapi` at b8d6c94, its micro API 0.2 (`uhaptikfabriken.h`).
 
@@ -17,7 +17,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 /// Of a line, its end included.
 pub(crate) const LINE: usize = 64;
-/// Of a line with one end alone.
+/// Of a line of the older micro API.
 const SHORT_LINE: usize = LINE - 1;
 /// The command that goes with a force: 0 goes with currents, 1 sets counters.
 const FORCE: i32 = 2;
@@ -42,7 +42,7 @@ pub struct Frame {
 /// Why a line is not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BrokenFrame {
-    /// Not 64 bytes, or 63, with the line's end last.
+    /// Not the bytes of the board's lines, with the line's end last.
     #[error("a line of the Polhem board has neither {LINE} bytes nor {SHORT_LINE}")]
     Length,
     /// Not eight numbers.
@@ -54,22 +54,22 @@ pub enum BrokenFrame {
 }
 
 impl Frame {
-    /// Reads a line, its end included.
+    /// Reads a line of 64 bytes, its end included.
     ///
     /// # Errors
     /// [`BrokenFrame`].
     pub fn parse(line: &[u8]) -> Result<Self, BrokenFrame> {
+        Self::of(line, LINE)
+    }
+
+    /// The same of a board whose lines have so many bytes.
+    fn of(line: &[u8], bytes: usize) -> Result<Self, BrokenFrame> {
         let [text @ .., b'\n'] = line else {
             return Err(BrokenFrame::Length);
         };
-        // Behind the numbers of a long line is another end; before them may be what is left of the line before.
-        let is_whole = match line.len() {
-            LINE => true,
-            SHORT_LINE => !text.contains(&b'\n'),
-            _ => false,
-        };
+        // Behind the numbers is another line's end; before them may be what is left of the line before.
         let text = text.trim_ascii();
-        if !is_whole || text.contains(&b'\n') {
+        if line.len() != bytes || text.contains(&b'\n') {
             return Err(BrokenFrame::Length);
         }
         let text = str::from_utf8(text).map_err(|_| BrokenFrame::Numbers)?;
@@ -104,23 +104,31 @@ impl Frame {
         })
     }
 
-    /// The newest line at the front of `buffer`, with its bytes; it and all before it are taken, and what is no line is dropped.
-    pub(crate) fn newest(buffer: &mut Vec<u8>) -> Option<(Self, usize)> {
+    /// The newest line at the front of `buffer`, from which it and all before it are taken; what is no line is dropped. `length` is what the board's
+    /// lines have: two in a row tell it, and until then none is taken for one.
+    pub(crate) fn newest(buffer: &mut Vec<u8>, length: &mut Option<usize>) -> Option<Self> {
         let mut newest = None;
-        while buffer.len() >= SHORT_LINE {
-            let read = |bytes| Some((Self::parse(buffer.get(..bytes)?).ok()?, bytes));
-            let taken = match read(SHORT_LINE).or_else(|| read(LINE)) {
-                Some(found) => newest.insert(found).1,
-                None if buffer.len() < LINE => break,
+        loop {
+            let read = |from: usize, bytes: usize| {
+                let line = buffer.get(from..from + bytes)?;
+                Self::of(line, bytes).ok()
+            };
+            let in_a_row = |bytes: &usize| read(0, *bytes).and(read(*bytes, *bytes)).is_some();
+            *length = length.or_else(|| [LINE, SHORT_LINE].into_iter().find(in_a_row));
+            let taken = match length.and_then(|bytes| Some((read(0, bytes)?, bytes))) {
+                Some((frame, bytes)) => {
+                    newest = Some(frame);
+                    bytes
+                }
+                None if buffer.len() < length.unwrap_or(2 * LINE) => return newest,
                 // On from behind the next line's end.
                 None => match buffer.iter().position(|byte| *byte == b'\n') {
                     Some(end) => end + 1,
-                    None => break,
+                    None => return newest,
                 },
             };
             buffer.drain(..taken);
         }
-        newest
     }
 
     /// The line of it; `None` where it is too long.
@@ -280,11 +288,12 @@ mod tests {
                 } else {
                     broken.insert(at, b'7');
                 }
-                let mut buffer = Vec::new();
+                let (mut buffer, mut length) = (Vec::new(), None);
                 let mut found = Vec::new();
-                for bytes in [line(0), broken, line(2), line(3), line(4), line(5)] {
+                let [a, b, c, d, e] = [0, 2, 3, 4, 5].map(line);
+                for bytes in [a.clone(), a, broken, b, c, d, e] {
                     buffer.extend(bytes);
-                    found.extend(Frame::newest(&mut buffer).map(|(read, _)| read));
+                    found.extend(Frame::newest(&mut buffer, &mut length));
                 }
                 let is_good = |read: &Frame| {
                     let sent = Frame::parse(&line(read.info));
@@ -296,22 +305,31 @@ mod tests {
         }
     }
 
+    /// As the vendor's program writes it: numbers of a fixed width, an end, blanks, another end.
+    fn published(info: i32, bytes: usize) -> Vec<u8> {
+        let numbers =
+            format!(" -59.276   13.383 -148.002  0.0919 -1.8483  1.0370 -1.9512 {info}\n");
+        format!("{numbers:<width$}\n", width = bytes - 1).into_bytes()
+    }
+
     #[test]
-    fn a_board_that_speaks_in_63_bytes_is_understood_and_answered_so() {
-        let text = |info: i32| format!("{:<62}\n", format!("1.5 -2 3 0.1 0.2 0.3 0.4 {info}"));
-        let mut buffer = Vec::new();
-        for info in 0..3 {
-            buffer.extend(text(info).into_bytes());
-            let (frame, bytes) = Frame::newest(&mut buffer).expect("at once");
-            assert_eq!((frame.info, bytes, buffer.len()), (info, 63, 0));
+    fn two_lines_in_a_row_tell_whether_a_board_has_64_bytes_or_63() {
+        for bytes in [LINE, SHORT_LINE] {
+            for joined in 0..bytes {
+                let mut buffer = published(0, bytes).split_off(joined);
+                let mut length = None;
+                let mut found = Vec::new();
+                for info in 1..6 {
+                    buffer.extend(published(info, bytes));
+                    found.extend(Frame::newest(&mut buffer, &mut length));
+                }
+                assert_eq!(length, Some(bytes), "joined at {joined}");
+                let infos: Vec<i32> = found.iter().map(|frame| frame.info).collect();
+                assert!(infos.ends_with(&[3, 4, 5]), "{infos:?} at {joined}");
+                let is_right = |frame: &Frame| (frame.position[0] + 0.059_276).abs() < 1e-12;
+                assert!(found.iter().all(is_right), "{found:?}");
+            }
         }
-        // Joined in the middle of a line.
-        buffer.extend(text(7)[40..].bytes().chain(text(8).bytes()));
-        buffer.extend(text(9).bytes());
-        assert_eq!(
-            Frame::newest(&mut buffer).map(|(frame, _)| frame.info),
-            Some(9)
-        );
         let said = short_force_frame(&[1.0, -0.5, 0.25]);
         assert_eq!(
             said[..],

@@ -70,7 +70,7 @@ pub(super) fn run(
         watch(&mut session, left, terminal, |session| {
             admission.follow(session, terminal);
             metrics.follow(session);
-            other = scene.follow(session, terminal);
+            other = scene.follow(session.age(), terminal);
             other.is_none()
         });
         terminal.end_status();

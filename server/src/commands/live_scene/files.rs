@@ -6,7 +6,6 @@ use taut_scene::{NeededFile, Workbench};
 
 use super::load::Next;
 use crate::report::terminal::Terminal;
-use crate::session::Session;
 use crate::session::file_watch::FileWatch;
 use crate::shared::failure::Failure;
 
@@ -57,20 +56,14 @@ impl SceneWatch {
         }
     }
 
-    /// The session that is to take the place of this one, if the scene is another and can be served; says what became of a change.
-    pub(super) fn follow(
-        &mut self,
-        terminal: &Terminal,
-        load: impl FnOnce() -> Result<Next, Failure>,
-    ) -> Option<Next> {
-        if !self.files.is_due() {
-            return None;
-        }
-        let loaded = load().and_then(|next| {
-            Session::begin(&next.setup)?;
-            Ok(next)
-        });
-        match loaded {
+    /// Whether it is time for a look, and the look shows other files than those that were read.
+    pub(super) fn is_due(&mut self) -> bool {
+        self.files.is_due()
+    }
+
+    /// The session that is to take the place of this one, if what was read is another scene and can be served; says what became of a change.
+    pub(super) fn take(&self, terminal: &Terminal, read: Result<Next, Failure>) -> Option<Next> {
+        match read {
             // The workbench file may have changed in what is followed without a new session, or needs a restart. What was read counts: what was written
             // since then is due by itself.
             Ok(next)
@@ -129,19 +122,12 @@ mod tests {
 
     /// Asks until the files are read, `then` does what it does, and the answer is there.
     fn followed(watch: &mut SceneWatch, loader: &Loader, then: impl Fn()) -> Option<Next> {
-        let mut was_read = false;
-        loop {
-            let next = watch.follow(&Terminal::standard_error(), || {
-                was_read = true;
-                let next = loader.load();
-                then();
-                next
-            });
-            if was_read {
-                return next;
-            }
+        while !watch.is_due() {
             thread::sleep(Duration::from_millis(10));
         }
+        let next = loader.load();
+        then();
+        watch.take(&Terminal::standard_error(), next)
     }
 
     /// `taut serve --follow-scene` of a workbench file in `place`, and of this scene there.
@@ -185,6 +171,27 @@ mod tests {
         let none = followed(&mut watch, &loader, || write("1500.0"));
         assert!(none.is_none(), "a session of the old text");
         let next = followed(&mut watch, &loader, || ()).expect("the new one");
+        assert!(next.in_file.contains("1500.0"), "{}", next.in_file);
+    }
+
+    #[test]
+    fn files_are_read_beside_the_session_and_not_by_who_looks_after_it() {
+        let place = tempfile::tempdir().expect("a directory");
+        let (args, scene) = followed_scene(place.path(), BALL_ON_FLOOR);
+        let mut live = LiveScene::new(&args, Overrides::default(), Arc::default());
+        let mut first = live.first().unwrap_or_else(|error| panic!("{error}"));
+        live.begin(&mut first);
+        let edited = BALL_ON_FLOOR.replace("2000.0", "1500.00");
+        std::fs::write(&scene, edited).expect("written");
+        let next = loop {
+            let is_read_already = live.pending.is_some();
+            let next = live.follow(Duration::ZERO, &Terminal::standard_error());
+            if let Some(next) = next {
+                assert!(is_read_already, "it was read while the session waited");
+                break next;
+            }
+            thread::sleep(Duration::from_millis(10));
+        };
         assert!(next.in_file.contains("1500.0"), "{}", next.in_file);
     }
 

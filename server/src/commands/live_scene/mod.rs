@@ -7,6 +7,7 @@
 mod change;
 mod files;
 mod load;
+mod pending;
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -18,6 +19,7 @@ use self::change::{Change, Wanted, write_scene};
 use self::files::SceneWatch;
 use self::load::Loader;
 pub(super) use self::load::{Next, load_workbench};
+use self::pending::{Pending, joined};
 use crate::cli::ServeArgs;
 use crate::report::terminal::Terminal;
 use crate::session::Session;
@@ -32,12 +34,6 @@ const NO_FILE: &str =
     "the scene is part of the program and has no file; serve a scene file of your own";
 /// Shortest life of a session before an operator changes its scene: a flood of changes leaves time for force.
 const SHORTEST_LIFE: Duration = Duration::from_secs(1);
-
-/// A wish that is being looked at, on a thread of its own.
-struct Pending {
-    asked: AskedScene,
-    thread: JoinHandle<Result<Option<Change>, Failure>>,
-}
 
 /// A wish whose session begins now, and what it came to.
 struct Taken {
@@ -162,34 +158,52 @@ impl LiveScene {
         )));
     }
 
-    /// What is to take the place of this session, if something is.
-    pub(super) fn follow(&mut self, session: &Session, terminal: &Terminal) -> Option<Next> {
-        if let Some(pending) = self.pending.take() {
-            if !pending.thread.is_finished() {
+    /// What is to take the place of this session, whose loops have run for `age`, if something is.
+    pub(super) fn follow(&mut self, age: Duration, terminal: &Terminal) -> Option<Next> {
+        match self.pending.take() {
+            Some(pending) if !pending.is_finished() => {
                 self.pending = Some(pending);
                 return None;
             }
-            return self.conclude(pending, terminal);
+            Some(Pending::Wish(asked, thread)) => return self.conclude(asked, thread, terminal),
+            Some(Pending::Files(thread)) => return self.take_files(thread, terminal),
+            None => {}
         }
-        if let Some(files) = &mut self.files {
-            let loader = &self.loader;
-            let next = files.follow(terminal, || loader.load());
-            if let (Some(next), Some(running)) = (next, &self.running) {
-                if !running.not_kept.is_empty() {
-                    terminal.say(&format!(
-                        "what was changed while it ran, and not kept in a file, is gone: {}",
-                        running.not_kept.join("; ")
-                    ));
-                }
-                return Some(next);
-            }
-        }
-        if session.age() >= SHORTEST_LIFE
+        if self.files.as_mut().is_some_and(SceneWatch::is_due) {
+            self.read_files(terminal);
+        } else if age >= SHORTEST_LIFE
             && let Some(asked) = self.desk.take()
         {
             self.look_at(asked);
         }
         None
+    }
+
+    /// Begins to read the files, which are others now.
+    fn read_files(&mut self, terminal: &Terminal) {
+        match pending::load(self.loader.clone()) {
+            Ok(thread) => self.pending = Some(Pending::Files(thread)),
+            Err(error) => terminal.say(&format!(
+                "the changed scene is not taken: no thread reads it ({error})"
+            )),
+        }
+    }
+
+    /// Takes what the files are now.
+    fn take_files(
+        &self,
+        thread: JoinHandle<Result<Next, Failure>>,
+        terminal: &Terminal,
+    ) -> Option<Next> {
+        let (files, running) = (self.files.as_ref()?, self.running.as_ref()?);
+        let next = files.take(terminal, joined(thread))?;
+        if !running.not_kept.is_empty() {
+            terminal.say(&format!(
+                "what was changed while it ran, and not kept in a file, is gone: {}",
+                running.not_kept.join("; ")
+            ));
+        }
+        Some(next)
     }
 
     /// Begins to look at a wish.
@@ -218,9 +232,8 @@ impl LiveScene {
             scenes: running.scenes.clone(),
             wish,
         };
-        let thread = std::thread::Builder::new().name("scene".to_owned());
-        match thread.spawn(move || wanted.make()) {
-            Ok(thread) => self.pending = Some(Pending { asked, thread }),
+        match pending::make(wanted) {
+            Ok(thread) => self.pending = Some(Pending::Wish(asked, thread)),
             Err(error) => asked.answer(Err(format!("not taken: no thread reads it ({error})"))),
         }
     }
@@ -250,14 +263,13 @@ impl LiveScene {
     }
 
     /// Takes what came of a wish.
-    fn conclude(&mut self, pending: Pending, terminal: &Terminal) -> Option<Next> {
-        let Pending { asked, thread } = pending;
-        let made = thread.join().unwrap_or_else(|_| {
-            Err(Failure::failed(
-                "the program broke down over it; look at the server's log",
-            ))
-        });
-        let Some(made) = made.transpose() else {
+    fn conclude(
+        &mut self,
+        asked: AskedScene,
+        thread: JoinHandle<Result<Option<Change>, Failure>>,
+        terminal: &Terminal,
+    ) -> Option<Next> {
+        let Some(made) = joined(thread).transpose() else {
             let kept = self.keep_as_it_runs(&asked);
             asked.answer(kept.map_err(|why| format!("not kept: {why}")));
             return None;
