@@ -228,6 +228,22 @@ impl Exchange {
     }
 }
 
+/// What a service is asked that is only looked at: the state of its first arm. Nothing is set that another program may have set.
+pub(super) fn question(said: &Said) -> String {
+    let arm = said.arms.first();
+    let say = Say {
+        profile: None,
+        full: arm.is_none(),
+        arm: arm.map(|arm| arm.id.as_str()),
+        set_basis: false,
+        force: None,
+        grip: None,
+    };
+    let mut text = String::new();
+    say.write(&mut text);
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -244,6 +260,19 @@ mod tests {
             r#"{"orientation":{"w":1.0,"x":0.0,"y":0.0,"z":0.0}}"#,
         );
         format!(r#"{{"inverse3":[{arms}],"wireless_verse_grip":[{grips}]}}"#)
+    }
+
+    #[test]
+    fn who_looks_at_a_service_sets_nothing_there() {
+        let said = Said::parse(&inventory(&["A", "B"], &["1"])).expect("an inventory");
+        assert_eq!(
+            question(&said),
+            r#"{"session":{},"inverse3":[{"device_id":"A","commands":{"probe_position":{}}}]}"#
+        );
+        assert_eq!(
+            question(&Said::default()),
+            r#"{"session":{"force_render_full_state":{}}}"#
+        );
     }
 
     #[test]
