@@ -10,7 +10,7 @@ use std::time::Duration;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Message, WebSocket};
 
-use super::exchange::{Exchange, ExchangeSettings, question};
+use super::exchange::{Exchange, ExchangeSettings, Unusable, question};
 use super::message::{MessageError, Said};
 use super::version::{VersionError, service_version};
 use crate::devices::ArmState;
@@ -186,8 +186,11 @@ impl Talker {
             }
             line.state = *exchange.state();
             line.publish();
-            if why != exchange.unusable() {
-                why = exchange.unusable();
+            // Every connection begins with its axes being set: nothing to tell.
+            let now = exchange.unusable();
+            let now = now.filter(|now| *now != Unusable::BasisPending);
+            if why != now {
+                why = now;
                 match why {
                     Some(why) => tracing::warn!("no pose and no force: {why}"),
                     None => tracing::info!("the device can be used again"),
