@@ -58,7 +58,7 @@ fn hid_boards() -> Vec<PluggedPort> {
     let board = |device: &hidapi::DeviceInfo| {
         let ids = (device.vendor_id(), device.product_id());
         let path = device.path().to_string_lossy().into_owned();
-        crate::wooden::IDS.contains(&ids).then(|| PluggedPort {
+        crate::wooden::is_board(ids, device.interface_number()).then(|| PluggedPort {
             what: format!("{:04x}:{:04x}, HID", ids.0, ids.1),
             device: Some(format!("wooden={path}")),
             path,
