@@ -12,6 +12,8 @@ pub struct PluggedPort {
     pub what: String,
     /// What `--device` takes for it, where a driver here may fit.
     pub device: Option<String>,
+    /// Whether its USB numbers are those of this device's boards; otherwise any adapter has them, and anything may be plugged in.
+    pub is_its_board: bool,
 }
 
 /// USB number of PJRC's boards.
@@ -35,15 +37,13 @@ pub fn plugged_ports() -> Result<Vec<PluggedPort>, String> {
         };
         let maker = usb.product.or(usb.manufacturer).unwrap_or_default();
         // Polhem's text board is a Teensy; any adapter may be a SPIDAR's.
-        let driver = if usb.vid == TEENSY {
-            "polhem"
-        } else {
-            "spidar"
-        };
+        let is_teensy = usb.vid == TEENSY;
+        let driver = if is_teensy { "polhem" } else { "spidar" };
         Some(PluggedPort {
             what: format!("{:04x}:{:04x}, {maker}", usb.vid, usb.pid),
             device: Some(format!("{driver}:{}", port.port_name)),
             path: port.port_name,
+            is_its_board: is_teensy,
         })
     });
     Ok(on_usb.chain(hid_boards()).collect())
@@ -58,10 +58,11 @@ fn hid_boards() -> Vec<PluggedPort> {
     let board = |device: &hidapi::DeviceInfo| {
         let ids = (device.vendor_id(), device.product_id());
         let path = device.path().to_string_lossy().into_owned();
-        crate::wooden::IDS.contains(&ids).then(|| PluggedPort {
+        crate::wooden::is_board(ids, device.interface_number()).then(|| PluggedPort {
             what: format!("{:04x}:{:04x}, HID", ids.0, ids.1),
             device: Some(format!("wooden={path}")),
             path,
+            is_its_board: true,
         })
     };
     hid.device_list().filter_map(board).collect()

@@ -244,12 +244,17 @@ impl Wire {
         exchange
             .hear(&service.inventory(Duration::ZERO, 1))
             .expect("an inventory");
-        Self(Arc::new(Mutex::new(Ends {
+        let wire = Self(Arc::new(Mutex::new(Ends {
             exchange,
             service,
             now: Duration::ZERO,
             force: [0.0; 3],
-        })))
+        })));
+        // The arm's axes are set and confirmed.
+        while wire.with(|ends| ends.exchange.unusable().is_some()) {
+            wire.turn(Duration::ZERO);
+        }
+        wire
     }
 
     fn with<T>(&self, change: impl FnOnce(&mut Ends) -> T) -> T {
@@ -417,13 +422,8 @@ fn answer_of(position: &Vector3<f64>, turn: &UnitQuaternion<f64>) -> String {
 
 /// Loses, holds back, cuts and changes one answer in twenty: how many were damaged, and of these believed.
 fn damaged_frames(frames: u64) -> (u64, u64) {
-    let wire = Wire::new(true);
-    let device = ArmDevice::new(
-        Box::new(wire.clone()),
-        HaplySettings::default().arm(),
-        placement(),
-    );
-    let mut port = at_wall(device).port;
+    let (wire, held) = wired(true);
+    let mut port = held.port;
     let limits = SafetySettings::default().validation;
     let (g, start) = (placement().reference_point, placement().start);
     let mut dice = Dice(7);

@@ -14,7 +14,7 @@ use crate::calibration::Chart;
 use crate::canvas::Canvas;
 use crate::description::{self, Overrides};
 use crate::error::RenderError;
-use crate::headless::plain;
+use crate::headless::picture_file;
 use crate::preview::at_start;
 use crate::renderer::{Gpu, GpuChoice};
 use crate::stage::Stage;
@@ -91,7 +91,7 @@ impl Calibration {
             image
                 .write_to(&mut bytes, image::ImageFormat::Png)
                 .map_err(|error| canvas.gpu().broken(&error))?;
-            let name = plain(&format!("{}-{name}.png", self.node));
+            let name = picture_file(&self.node, &format!("{name}.png"));
             Ok((name.into(), bytes.into_inner()))
         };
         images.into_iter().map(png).collect()

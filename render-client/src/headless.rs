@@ -162,7 +162,7 @@ fn write_pictures(canvas: &Canvas, plan: &Plan, frame: u64) -> Result<(), Render
         return Ok(());
     };
     for (name, image) in canvas.images()? {
-        let path = folder.join(plain(&format!("{node}-{name}-{frame:05}.png")));
+        let path = folder.join(picture_file(node, &format!("{name}-{frame:05}.png")));
         image.save(&path).map_err(|error| RenderError::Picture {
             path: path.clone(),
             reason: error.to_string(),
@@ -171,9 +171,14 @@ fn write_pictures(canvas: &Canvas, plan: &Plan, frame: u64) -> Result<(), Render
     Ok(())
 }
 
+/// The file of a node's `picture`. The first `-` ends the node's name, in which there is none, so that no two nodes write one file.
+pub(crate) fn picture_file(node: &str, picture: &str) -> String {
+    format!("{}-{}", plain(node).replace('-', "+2d"), plain(picture))
+}
+
 /// A file name without characters that a file system or a shell might take for something else: each byte of such a character is `+` and two
 /// hexadecimal digits, so that no two names become one.
-pub(crate) fn plain(name: &str) -> String {
+fn plain(name: &str) -> String {
     let keep = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
     let mut plain = String::with_capacity(name.len());
     for c in name.chars() {
@@ -190,7 +195,7 @@ pub(crate) fn plain(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::plain;
+    use super::{picture_file, plain};
 
     #[test]
     fn a_picture_stays_in_its_folder_whatever_its_screen_is_called() {
@@ -198,6 +203,19 @@ mod tests {
             plain("left-../../wall 1-00001.png"),
             "left-..+2f..+2fwall+201-00001.png"
         );
+    }
+
+    #[test]
+    fn pictures_of_two_nodes_never_have_one_name() {
+        assert_eq!(
+            picture_file("wall", "left-top-00001.png"),
+            "wall-left-top-00001.png"
+        );
+        assert_eq!(
+            picture_file("wall-left", "top-00001.png"),
+            "wall+2dleft-top-00001.png"
+        );
+        assert_eq!(picture_file("wall+2dleft", "top"), "wall+2b2dleft-top");
     }
 
     #[test]

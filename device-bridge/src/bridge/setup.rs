@@ -11,10 +11,10 @@ use super::BridgeError;
 use crate::bridge_loop::BridgeLoop;
 use crate::choice::{DeviceChoice, InputChoice};
 use crate::cli::BridgeArgs;
-use crate::device::{Device, Pose};
+use crate::device::{Device, DeviceLimits, Pose};
 use crate::devices::{AtEnd, Grip, MinJerkPath, RecordedDevice, SimulatedDevice, Trace, Tremor};
 use crate::placement::Placement;
-use crate::port::{DevicePort, Passivity};
+use crate::port::{DevicePort, Passivity, SafetySettings};
 use crate::simulated_strings::{simulated_spidar, string_geometry};
 use crate::trace_file::{read_trace, via_points};
 
@@ -204,6 +204,67 @@ pub(super) fn behind_port(
     let mut safety = args.safety.settings(args.rate, nobody_is_hurt);
     if !has_motors {
         safety.passivity.mode = Passivity::Observe; // nobody is given any energy
+    } else {
+        for sentence in lowered(&safety, &device.info().limits) {
+            tracing::warn!("{sentence}");
+        }
     }
     BridgeLoop::new(DevicePort::new(device, safety, reference_point, start))
+}
+
+/// What to tell a user of limits that are held to what fades in time.
+fn lowered(safety: &SafetySettings, limits: &DeviceLimits) -> Vec<String> {
+    let asked = safety.within(limits);
+    let held = asked.that_can_fade();
+    let rate_hz = safety.period.as_secs_f64().recip();
+    [
+        (
+            ("--max-force", asked.max_force, held.max_force, "N"),
+            ("--force-slew", safety.force_rate),
+        ),
+        (
+            ("--max-torque", asked.max_torque, held.max_torque, "N m"),
+            ("--torque-slew", safety.torque_rate),
+        ),
+    ]
+    .into_iter()
+    .filter(|((_, asked, held, _), _)| held < asked)
+    .map(|((limit, asked, held, unit), (slew, rate))| {
+        format!(
+            "{limit} is lowered from {asked} to {held:.2} {unit}: at {slew} {} and --rate {rate_hz:.0} no more fades in time",
+            rate * 1e-3
+        )
+    })
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn a_limit_that_is_lowered_to_what_fades_in_time_is_told() {
+        let said = |max_force, rate_hz: f64, limits| {
+            let safety = SafetySettings {
+                max_force,
+                period: Duration::from_secs_f64(rate_hz.recip()),
+                ..SafetySettings::default()
+            };
+            lowered(&safety, &limits).join("; ")
+        };
+        let unlimited = DeviceLimits::UNLIMITED;
+        assert_eq!(said(47.5, 1000.0, unlimited), "");
+        assert_eq!(
+            said(60.0, 1000.0, unlimited),
+            "--max-force is lowered from 60 to 47.50 N: at --force-slew 0.5 and --rate 1000 no more fades in time"
+        );
+        assert!(said(20.0, 100.0, unlimited).contains("from 20 to 8.00 N"));
+        let weak = DeviceLimits {
+            max_force: 5.0,
+            ..unlimited
+        };
+        assert_eq!(said(60.0, 1000.0, weak), "", "the device's own limit");
+    }
 }

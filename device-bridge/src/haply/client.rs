@@ -10,7 +10,7 @@ use std::time::Duration;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Message, WebSocket};
 
-use super::exchange::{Exchange, ExchangeSettings};
+use super::exchange::{Exchange, ExchangeSettings, Unusable, question};
 use super::message::{MessageError, Said};
 use super::version::{VersionError, service_version};
 use crate::devices::ArmState;
@@ -186,8 +186,11 @@ impl Talker {
             }
             line.state = *exchange.state();
             line.publish();
-            if why != exchange.unusable() {
-                why = exchange.unusable();
+            // Every connection begins with its axes being set: nothing to tell.
+            let now = exchange.unusable();
+            let now = now.filter(|now| *now != Unusable::BasisPending);
+            if why != now {
+                why = now;
                 match why {
                     Some(why) => tracing::warn!("no pose and no force: {why}"),
                     None => tracing::info!("the device can be used again"),
@@ -228,7 +231,8 @@ pub struct HaplyFound {
     pub answers: Vec<Duration>,
 }
 
-/// Looks at a service: reads its inventory, and asks for the state of its arms `LOOKS` times, without force.
+/// Looks at a service: reads its inventory, and asks for the state of its first arm `LOOKS` times, without force. It sets nothing: another program
+/// may have set the arm's axes.
 ///
 /// # Errors
 /// [`HaplyError`]: nobody answers, or too old a service.
@@ -244,15 +248,14 @@ pub fn look(address: &ServiceAddress) -> Result<HaplyFound, HaplyError> {
     let measured = || {
         let greeting = next_text(&mut socket)?.ok_or(Lost::NoInventory)?;
         let said = Said::parse(&greeting).map_err(Lost::Nonsense)?;
-        let mut exchange = Exchange::new(ExchangeSettings::default());
-        exchange.hear(&greeting).map_err(Lost::Nonsense)?;
+        let question = question(&said);
         let mut answers = Vec::with_capacity(LOOKS);
         for _ in 0..LOOKS {
             let begun = monotonic_now();
-            send(&mut socket, exchange.say(None))?;
+            send(&mut socket, &question)?;
             let answer = next_text(&mut socket)?.ok_or(Lost::NoAnswer)?;
             answers.push(monotonic_now().saturating_sub(begun));
-            exchange.hear(&answer).map_err(Lost::Nonsense)?;
+            Said::parse(&answer).map_err(Lost::Nonsense)?;
             thread::sleep(PERIOD);
         }
         answers.sort_unstable();

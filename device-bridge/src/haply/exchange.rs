@@ -45,6 +45,9 @@ pub enum Unusable {
     /// Its motors have no power.
     #[error("the device's motors have no power; connect its power supply")]
     NoPower,
+    /// The order of its axes was asked for, and is not confirmed yet: what it says until then may be in another.
+    #[error("the device's axes are being set")]
+    BasisPending,
     /// Its axes are in another order than was asked for.
     #[error(
         "the service gives the device's axes in another order than {PERMUTATION}, which was asked for; set its basis to {PERMUTATION}"
@@ -72,7 +75,8 @@ pub struct Exchange {
     text: String,
 }
 
-/// The message, counted with the arm there, from which the configuration counts that was asked for in the first.
+/// The message, counted with the arm there, from which the configuration counts that was asked for in the first. It asks for all, so that its answer
+/// confirms it.
 const CONFIGURED: u32 = 2;
 
 impl Exchange {
@@ -179,6 +183,7 @@ impl Exchange {
             (arm.calibrated, Unusable::NotCalibrated),
             (arm.ready, Unusable::NotReady),
             (arm.powered, Unusable::NoPower),
+            (self.said > CONFIGURED, Unusable::BasisPending),
             (!self.other_basis, Unusable::OtherBasis),
         ] {
             if !good {
@@ -221,11 +226,26 @@ impl Exchange {
             grip: self.grip.as_ref().map(|(kind, id)| (*kind, id.as_str())),
         };
         say.write(&mut self.text);
-        if is_there {
-            self.said = self.said.saturating_add(1);
-        }
+        // One that comes again is configured again: it may be a restarted one.
+        self.said = if is_there { self.said.saturating_add(1) } else { 0 };
         &self.text
     }
+}
+
+/// What a service is asked that is only looked at: the state of its first arm. Nothing is set that another program may have set.
+pub(super) fn question(said: &Said) -> String {
+    let arm = said.arms.first();
+    let say = Say {
+        profile: None,
+        full: arm.is_none(),
+        arm: arm.map(|arm| arm.id.as_str()),
+        set_basis: false,
+        force: None,
+        grip: None,
+    };
+    let mut text = String::new();
+    say.write(&mut text);
+    text
 }
 
 #[cfg(test)]
@@ -247,11 +267,52 @@ mod tests {
     }
 
     #[test]
+    fn who_looks_at_a_service_sets_nothing_there() {
+        let said = Said::parse(&inventory(&["A", "B"], &["1"])).expect("an inventory");
+        assert_eq!(
+            question(&said),
+            r#"{"session":{},"inverse3":[{"device_id":"A","commands":{"probe_position":{}}}]}"#
+        );
+        assert_eq!(
+            question(&Said::default()),
+            r#"{"session":{"force_render_full_state":{}}}"#
+        );
+    }
+
+    #[test]
+    fn no_pose_counts_in_axes_that_are_not_confirmed() {
+        let mut exchange = Exchange::new(ExchangeSettings::default());
+        let answer = inventory(&["A"], &["1"]);
+        for other_program in [false, true] {
+            exchange.begin();
+            exchange.hear(&answer).expect("the greeting");
+            for _ in 0..CONFIGURED {
+                assert_eq!(exchange.unusable(), Some(Unusable::BasisPending));
+                assert!(!exchange.state().is_usable);
+                let said = exchange.say(Some([1.0, 0.0, 0.0]));
+                assert!(!said.contains("set_cursor_force"), "{said}");
+                exchange.hear(&answer).expect("an answer");
+            }
+            assert!(exchange.say(None).contains("force_render_full_state"));
+            let basis = if other_program { "XZY" } else { "XYZ" };
+            let config = format!(r#""config":{{"basis":{{"permutation":"{basis}"}}}},"state""#);
+            let full = answer.replacen(r#""state""#, &config, 1);
+            exchange.hear(&full).expect("an answer");
+            let wanted = other_program.then_some(Unusable::OtherBasis);
+            assert_eq!(exchange.unusable(), wanted);
+            assert_eq!(exchange.state().reports, 1);
+        }
+    }
+
+    #[test]
     fn every_connection_is_for_the_arm_and_the_grip_of_the_first() {
         let mut exchange = Exchange::new(ExchangeSettings::default());
         let heard = |exchange: &mut Exchange, arms: &[&str], grips: &[&str]| {
-            let heard = exchange.hear(&inventory(arms, grips));
-            heard.expect("an inventory");
+            for _ in 0..CONFIGURED + 2 {
+                let heard = exchange.hear(&inventory(arms, grips));
+                heard.expect("an inventory");
+                let _ = exchange.say(None);
+            }
             exchange.unusable()
         };
         assert_eq!(heard(&mut exchange, &["A", "B"], &["1", "2"]), None);

@@ -112,7 +112,7 @@ impl SafetySettings {
 
     /// The same with a ramp-out that its period leaves time for, and with limits from which the force can come down in it without breaking the slew
     /// limit: only so can both promises be kept at once.
-    pub(super) fn that_can_fade(mut self) -> Self {
+    pub(crate) fn that_can_fade(mut self) -> Self {
         self.ramp_out = self.ramp_out.min(Self::ramp_out_at(self.period));
         // A write uses up one period at most, and not all of a long one.
         let time = if self.period > Self::LONGEST_STEP {

@@ -244,30 +244,25 @@ impl Serial {
     ) -> std::io::Result<()> {
         let mut ticker = Ticker::at_phase(PERIOD, PHASE);
         let mut believed = monotonic_now();
-        port.clear(ClearBuffer::Input)?;
         while !line.is_over() {
             ticker.wait();
             let now = monotonic_now();
             let is_believed = now.saturating_sub(believed) < HOLDS;
             let digits = line.command_if(now, is_believed).unwrap_or_default();
-            match self.exchange(port, cycle, &digits)? {
-                Ok(raw) => {
-                    if let Some(counts) = self.counters.take(monotonic_now(), &raw) {
-                        believed = monotonic_now();
-                        line.state = Counted {
-                            readings: line.state.readings + 1,
-                            counts,
-                            is_there: true,
-                        };
-                        line.publish();
-                    } else if self.counters.were_reset() {
-                        return Err(std::io::Error::other(
-                            "they began to count anew, so that the calibration is lost; hold the grip at the centre and start again",
-                        ));
-                    }
+            if let Ok(raw) = self.exchange(port, cycle, &digits)? {
+                if let Some(counts) = self.counters.take(monotonic_now(), &raw) {
+                    believed = monotonic_now();
+                    line.state = Counted {
+                        readings: line.state.readings + 1,
+                        counts,
+                        is_there: true,
+                    };
+                    line.publish();
+                } else if self.counters.were_reset() {
+                    return Err(std::io::Error::other(
+                        "they began to count anew, so that the calibration is lost; hold the grip at the centre and start again",
+                    ));
                 }
-                // What else is on its way belongs to nothing.
-                Err(_) => port.clear(ClearBuffer::Input)?,
             }
             if monotonic_now().saturating_sub(believed) > GIVEN_UP {
                 return Err(std::io::Error::other("no answer is to be believed"));
@@ -284,6 +279,8 @@ impl Serial {
         digits: &[i16; STRINGS],
     ) -> std::io::Result<Result<[i16; STRINGS], BrokenCycle>> {
         cycle.send(digits, &mut self.bytes);
+        // What came too late answers a cycle before: taken for this one's, it would leave every later answer one cycle late.
+        port.clear(ClearBuffer::Input)?;
         port.write_all(&self.bytes)?;
         let until = monotonic_now() + ANSWER_WITHIN;
         self.heard.clear();
@@ -309,5 +306,40 @@ impl Serial {
                 return;
             }
         }
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use serialport::TTYPort;
+
+    use super::super::packet::CURRENT;
+    use super::*;
+
+    #[test]
+    fn an_answer_that_came_too_late_is_not_the_next_cycles() {
+        let (mut far, near) = TTYPort::pair().expect("a terminal");
+        let mut port: Port = Box::new(near);
+        port.set_timeout(ANSWER_WITHIN).expect("a patience");
+        let eight = BoardInfo::of_model(7).expect("known");
+        let cycle = Cycle::new(vec![(0, eight)]).expect("eight motors");
+        let mut answer = vec![0; eight.cycle_answer()];
+        answer[0] = header(0, CURRENT);
+        answer.extend(&eight.answer(0)[..5]);
+        assert_eq!(cycle.hear(&answer), Ok([0; STRINGS]), "it is a whole one");
+
+        far.write_all(&answer).expect("room");
+        while (port.bytes_to_read().expect("a terminal") as usize) < answer.len() {
+            thread::yield_now();
+        }
+        let mut serial = Serial {
+            path: String::new(),
+            found: None,
+            counters: Counters::new(3.485e-5),
+            bytes: Vec::new(),
+            heard: Vec::new(),
+        };
+        let heard = serial.exchange(&mut port, &cycle, &[0; STRINGS]);
+        assert_eq!(heard.expect("a terminal"), Err(BrokenCycle::Short));
     }
 }

@@ -9,8 +9,9 @@
 //! | `boards.rs`    | the thread on the serial port: [`SpidarBoards`], a `StringHardware`           |
 //! | `simulated.rs` | the boards' side, with strings and hand, byte by byte                         |
 //!
-//! Facts: the published host side of Springhead (Boost, MIT or BSD licence), read for facts. The boards' firmware is not public, and no board was at hand:
-//! how fast they answer, what they do with a broken packet, and whether they let go of a current by themselves are not known.
+//! Facts: the published host side of Springhead (Boost, MIT or BSD licence), read for facts. Firmware of such boards is published, too
+//! (haselab-net/StuffedV3, folder `PIC`), but not which of it a device has, and no board was at hand: how fast they answer, what they do with a broken packet,
+//! and whether they let go of a current by themselves are not known.
 
 mod boards;
 mod converter;

@@ -25,9 +25,15 @@ pub trait ReportLine: Send {
 
 /// USB ids of the boards: a Teensy, an mbed.
 #[cfg(feature = "hid")]
-pub(crate) const IDS: [(u16, u16); 2] = [(TEENSY_VENDOR, 0x0486), (0x1234, 0x0006)];
+const IDS: [(u16, u16); 2] = [(TEENSY_VENDOR, 0x0486), (0x1234, 0x0006)];
 #[cfg(feature = "hid")]
 const TEENSY_VENDOR: u16 = 0x16c0;
+
+/// Whether reports go through this interface of a device. A Teensy has a second one under the same ids, number 1: its emulated serial port.
+#[cfg(feature = "hid")]
+pub(crate) fn is_board(ids: (u16, u16), interface: i32) -> bool {
+    IDS.contains(&ids) && (ids.0 != TEENSY_VENDOR || interface <= 0) // below 0: not known
+}
 
 /// Opens the device at `path`, a hidraw or a socket; without one the first board on USB.
 pub(crate) fn open(path: Option<&Path>) -> Result<Box<dyn ReportLine>, String> {
@@ -50,7 +56,10 @@ fn open_hid(path: Option<&Path>) -> Result<Box<dyn ReportLine>, String> {
     let wanted = path.and_then(Path::to_str);
     let found = hid.device_list().find(|device| match wanted {
         Some(path) => device.path().to_str() == Ok(path),
-        None => IDS.contains(&(device.vendor_id(), device.product_id())),
+        None => is_board(
+            (device.vendor_id(), device.product_id()),
+            device.interface_number(),
+        ),
     });
     let found = found
         .ok_or_else(|| "no such board is plugged in (USB 16c0:0486 or 1234:0006)".to_owned())?;
@@ -165,6 +174,16 @@ mod tests {
     use std::thread;
 
     use super::*;
+
+    #[cfg(feature = "hid")]
+    #[test]
+    fn the_emulated_serial_port_of_a_teensy_is_no_board() {
+        let [teensy, mbed] = IDS;
+        assert!(is_board(teensy, 0) && is_board(teensy, -1));
+        assert!(!is_board(teensy, 1));
+        assert!(is_board(mbed, 1));
+        assert!(!is_board((TEENSY_VENDOR, 0x0483), 0), "a serial one");
+    }
 
     #[test]
     fn a_report_waits_for_a_board_that_is_busy() {

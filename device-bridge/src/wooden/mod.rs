@@ -17,7 +17,7 @@ mod report;
 mod simulated;
 
 #[cfg(feature = "hid")]
-pub(crate) use line::IDS;
+pub(crate) use line::is_board;
 
 pub use board::WoodenError;
 pub(crate) use board::start;

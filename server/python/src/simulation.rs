@@ -4,6 +4,7 @@ use std::sync::{Mutex, MutexGuard};
 
 use god_object::ProjectionStatus;
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use taut_scene::{Runner, Scene};
 
@@ -67,6 +68,24 @@ impl Simulation {
         self.runner.lock().map_err(|_| {
             bad("an earlier call ended by a fault of the library; reset the simulation")
         })
+    }
+
+    /// The number of an obstacle. One that is below 0 or beyond any list is refused as every other that no obstacle has.
+    fn index_of(&self, index: &Bound<'_, PyAny>) -> PyResult<usize> {
+        index.extract::<usize>().map_err(|error| {
+            if error.is_instance_of::<PyOverflowError>(index.py()) {
+                self.no_obstacle(index)
+            } else {
+                error
+            }
+        })
+    }
+
+    fn no_obstacle(&self, index: &impl std::fmt::Display) -> PyErr {
+        let count = self.obstacles.len();
+        bad(format!(
+            "there is no obstacle {index}; the scene has {count}, counted from 0"
+        ))
     }
 }
 
@@ -161,7 +180,13 @@ impl Simulation {
         table(py, rows, 7)
     }
 
-    fn move_obstacle(&self, py: Python<'_>, index: usize, target: VectorLike<'_>) -> PyResult<()> {
+    fn move_obstacle(
+        &self,
+        py: Python<'_>,
+        index: &Bound<'_, PyAny>,
+        target: VectorLike<'_>,
+    ) -> PyResult<()> {
+        let index = self.index_of(index)?;
         let target = pose_of(&target)?;
         py.detach(|| self.lock()?.move_obstacle(index, &target).map_err(bad))
     }
@@ -169,15 +194,11 @@ impl Simulation {
     fn obstacle_pose<'py>(
         &self,
         py: Python<'py>,
-        index: usize,
+        index: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let index = self.index_of(index)?;
         let pose = py.detach(|| Ok::<_, PyErr>(self.lock()?.obstacle_pose(index).copied()))?;
-        let count = self.obstacles.len();
-        let pose = pose.ok_or_else(|| {
-            bad(format!(
-                "there is no obstacle {index}; the scene has {count}, counted from 0"
-            ))
-        })?;
+        let pose = pose.ok_or_else(|| self.no_obstacle(&index))?;
         Ok(array_of(py, &pose))
     }
 

@@ -159,6 +159,9 @@ class Steps(unittest.TestCase):
             (lambda: sim.force(np.nan, sim.start), "the time is NaN"),
             (lambda: sim.obstacle_pose(9), "no obstacle 9"),
             (lambda: sim.move_obstacle(9, sim.start), "no obstacle 9"),
+            (lambda: sim.move_obstacle(-1, sim.start), "no obstacle -1; the scene has 1"),
+            (lambda: sim.obstacle_pose(-1), "no obstacle -1"),
+            (lambda: sim.obstacle_pose(1 << 70), f"no obstacle {1 << 70}"),
             (lambda: taut.Simulation("nowhere.toml"), "nowhere.toml"),
             (lambda: taut.Simulation("sphere-on-plane", ["coupling.k_s=-1"]), "k_s"),
             (lambda: taut.read_trace("nowhere.csv"), "nowhere.csv: cannot be opened"),
@@ -167,6 +170,7 @@ class Steps(unittest.TestCase):
             with self.subTest(text), self.assertRaisesRegex(taut.TautError, text):
                 call()
         self.assertRaises((TypeError, ValueError), lambda: sim.update("here"))
+        self.assertRaises(TypeError, lambda: sim.obstacle_pose("floor"))
 
     def test_files_are_checked_as_by_the_program(self):
         for name in ("nowhere.ply", SCENES / "peg-in-a-hole.toml"):

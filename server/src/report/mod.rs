@@ -8,6 +8,8 @@ pub(crate) mod frames;
 mod loops;
 pub(crate) mod metrics;
 pub(crate) mod metrics_lines;
+#[cfg(test)]
+mod metrics_page;
 mod replay;
 mod session;
 pub mod terminal;

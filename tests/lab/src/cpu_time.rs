@@ -11,7 +11,8 @@ pub fn thread_us() -> f64 {
 /// The value below which the share `share` of the `values` lies (nearest rank); NaN of none.
 pub fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
+    // What is no number is the largest, whatever its sign: computed ones are below all others in `total_cmp`.
+    sorted.sort_by(|a, b| a.is_nan().cmp(&b.is_nan()).then(a.total_cmp(b)));
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted
         .get(rank.saturating_sub(1))
@@ -29,5 +30,8 @@ mod tests {
         assert_eq!(quantile(&values, 0.5), 2.0);
         assert_eq!(quantile(&values, 0.99), 4.0);
         assert!(quantile(&[], 0.5).is_nan());
+        let with_none = [3.0, -f64::NAN, f64::NAN, 1.0];
+        assert_eq!(quantile(&with_none, 0.5), 3.0);
+        assert!(quantile(&with_none, 0.75).is_nan());
     }
 }

@@ -307,8 +307,8 @@ impl ForceErrors {
     }
 
     fn felt(&self) -> f64 {
-        if self.force.is_empty() {
-            return f64::NAN;
+        if self.force.is_empty() || self.force.iter().chain(&self.torque).any(|e| e.is_nan()) {
+            return f64::NAN; // f64::max would drop it
         }
         [
             quantile(&self.direction, 0.95) / JND_DIRECTION,
@@ -339,13 +339,8 @@ mod tests {
     #[test]
     fn a_spring_gives_back_what_it_took_and_a_late_one_more() {
         // 1000 N/m, in 2 mm and out; then the same without force on the way in.
-        let spring = ticks(&[
-            (0.0, 0.0),
-            (-1e-3, 1.0),
-            (-2e-3, 2.0),
-            (-1e-3, 1.0),
-            (0.0, 0.0),
-        ]);
+        let heights = [0.0, -1e-3, -2e-3, -1e-3, 0.0];
+        let spring = ticks(&heights.map(|height| (height, -1e3 * height)));
         assert!(energy(&spring).abs() < 1e-15);
         let late = ticks(&[
             (0.0, 0.0),
@@ -367,5 +362,7 @@ mod tests {
         assert_eq!((errors.step, errors.excess_step), (1.0, 1.0));
         assert!((errors.step_jnd - 1.0 / 0.14).abs() < 1e-12);
         assert_eq!(errors.friction, 1.5);
+        let none = ticks(&[(0.0, f64::NAN); 3]);
+        assert!(ForceErrors::new(&none, &ideal).felt().is_nan());
     }
 }

@@ -59,7 +59,8 @@ impl Answer {
         }
     }
 
-    fn converged(&self) -> bool {
+    /// Whether halving the step changes it by no more than a tenth of what is felt.
+    pub(crate) fn converged(&self) -> bool {
         self.force_error <= FORCE_ERROR && self.torque_error <= TORQUE_ERROR
     }
 

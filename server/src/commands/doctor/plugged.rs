@@ -145,6 +145,7 @@ mod tests {
                 path: "/dev/ttyUSB0".to_owned(),
                 what: "0403:6001, FTDI".to_owned(),
                 device: device.map(str::to_owned),
+                is_its_board: false,
             })
             .found
         };

@@ -4,7 +4,8 @@ use std::fmt;
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 
-use taut_bridge::{HidPort, ReportPort, plugged_ports};
+use taut_bridge::haply::{self, ServiceAddress};
+use taut_bridge::{HidPort, PluggedPort, ReportPort, plugged_ports};
 
 /// A connected monitor.
 struct Monitor {
@@ -25,7 +26,7 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// Looks at this machine. Nothing is moved and nothing is sent.
+    /// Looks at this machine. Nothing is moved, and nobody is asked but an Inverse service of its own, for states alone.
     pub(super) fn here() -> Self {
         let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         let host = host.split('.').next().unwrap_or_default().trim();
@@ -34,7 +35,10 @@ impl Found {
             host: if is_name { host } else { "haptic-pc" }.to_owned(),
             address: own_address().unwrap_or(IpAddr::V4(Ipv4Addr::LOCALHOST)),
             monitors: monitors(),
-            device: device(),
+            device: device(
+                plugged_ports().unwrap_or_default(),
+                &ServiceAddress::default(),
+            ),
         }
     }
 
@@ -64,7 +68,7 @@ impl fmt::Display for Found {
             } else {
                 monitors.join(", ")
             },
-            self.device.as_deref().unwrap_or("none plugged in"),
+            self.device.as_deref().unwrap_or("none known"),
         )
     }
 }
@@ -115,16 +119,46 @@ fn monitors() -> Vec<Monitor> {
     monitors
 }
 
-/// A force device on a port, else a SpaceMouse.
-fn device() -> Option<String> {
-    let plugged = plugged_ports().unwrap_or_default();
-    let known = plugged.into_iter().find_map(|port| port.device);
-    known.or_else(|| HidPort.open().is_ok().then(|| "space-mouse".to_owned()))
+/// A force device whose board is on a port or whose service has an arm, else a SpaceMouse. What may be any adapter is nobody's default: a bridge would
+/// write to whatever is there.
+fn device(ports: Vec<PluggedPort>, service: &ServiceAddress) -> Option<String> {
+    let mut boards = ports.into_iter().filter(|port| port.is_its_board);
+    let on_port = boards.find_map(|port| port.device);
+    let has_arm = || haply::look(service).is_ok_and(|found| !found.said.arms.is_empty());
+    on_port
+        .or_else(|| has_arm().then(|| format!("haply={service}")))
+        .or_else(|| HidPort.open().is_ok().then(|| "space-mouse".to_owned()))
 }
 
 #[cfg(test)]
 mod tests {
+    use taut_bridge::Hand;
+    use taut_bridge::haply::{HaplyService, SimulatedInverse, SimulatedSettings};
+
     use super::*;
+
+    #[test]
+    fn an_adapter_is_no_device_by_default_and_a_service_with_an_arm_is() {
+        let port = |device: &str, is_its_board| PluggedPort {
+            path: "/dev/ttyUSB0".to_owned(),
+            what: "0403:6001, FTDI".to_owned(),
+            device: Some(device.to_owned()),
+            is_its_board,
+        };
+        let inverse = SimulatedInverse::new(&SimulatedSettings::held(Hand::LIGHT));
+        let any = "127.0.0.1:0".parse().expect("an address");
+        let service = HaplyService::start(any, inverse).expect("a free port");
+        let at: ServiceAddress = service.address().to_string().parse().expect("an address");
+
+        let adapter = port("spidar:/dev/ttyUSB0", false);
+        let found = device(vec![adapter.clone()], &at);
+        assert_eq!(found, Some(format!("haply={at}")));
+        let found = device(vec![adapter.clone(), port("wooden=/dev/x", true)], &at);
+        assert_eq!(found.as_deref(), Some("wooden=/dev/x"));
+        drop(service);
+        let found = device(vec![adapter], &at);
+        assert!(found.is_none_or(|found| found == "space-mouse"));
+    }
 
     #[test]
     fn guessed_addresses_are_the_next_free_ones_of_the_network() {

@@ -221,7 +221,15 @@ fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
 /// The right wrench at every tick.
 fn answer(scene: &FidelityScene, built: &BuiltScene) -> Vec<god_object::Vector6> {
     let ideal = scene.ideal.map_or(Ideal::Reference, Ideal::closed);
-    recipe(scene, built, ideal).answer().wrenches.clone()
+    let recipe = recipe(scene, built, ideal);
+    let answer = recipe.answer();
+    if !answer.converged() {
+        eprintln!(
+            "{}: half the step changes the right answer by {:.3} N, {:.5} N m: too much to judge errors by",
+            scene.name, answer.force_error, answer.torque_error
+        );
+    }
+    answer.wrenches.clone()
 }
 
 fn measure(
