@@ -227,7 +227,11 @@ impl Exchange {
         };
         say.write(&mut self.text);
         // One that comes again is configured again: it may be a restarted one.
-        self.said = if is_there { self.said.saturating_add(1) } else { 0 };
+        self.said = if is_there {
+            self.said.saturating_add(1)
+        } else {
+            0
+        };
         &self.text
     }
 }
@@ -319,15 +323,23 @@ mod tests {
 
         exchange.begin();
         assert_eq!(exchange.unusable(), Some(Unusable::NoService));
-        let other_arm = heard(&mut exchange, &["B"], &["1"]);
-        assert_eq!(other_arm, Some(Unusable::NotPlugged));
-        assert!(!exchange.say(None).contains("configure"), "it is not there");
+        // It may be plugged in late, and again.
+        for _ in 0..2 {
+            let other_arm = heard(&mut exchange, &["B"], &["1"]);
+            assert_eq!(other_arm, Some(Unusable::NotPlugged));
+            assert!(!exchange.say(None).contains("configure"), "it is not there");
+            exchange
+                .hear(&inventory(&["B", "A"], &["1"]))
+                .expect("an inventory");
+            let said = exchange.say(None);
+            assert!(said.contains(PERMUTATION), "its axes are set now: {said}");
+            assert!(!exchange.say(None).contains(PERMUTATION), "and once");
+        }
         let other_grip = heard(&mut exchange, &["B", "A"], &["2"]);
         assert_eq!(other_grip, Some(Unusable::NoGrip));
         assert_eq!(heard(&mut exchange, &["B", "A"], &["2", "1"]), None);
         let said = exchange.say(Some([1.0, 0.0, 0.0]));
         let pushed = r#""device_id":"A","commands":{"set_cursor_force""#;
         assert!(said.contains(pushed), "{said}");
-        assert!(said.contains(PERMUTATION), "its axes are set now: {said}");
     }
 }
