@@ -21,6 +21,9 @@ const ON_HID: &[&str] = &[
     "DeviceAllow=char-usb_device rw",
 ];
 
+/// Instead of the unit's own: opened again by itself, the device would take the place where it is held then for its home.
+const STARTED_BY_A_PERSON: &str = "Restart=no";
+
 /// A unit of a machine.
 pub(super) struct Unit {
     /// With its ending.
@@ -152,8 +155,12 @@ fn quoted(word: &str) -> Result<String, String> {
 /// The unit of `docs/systemd` with its own command; how to install it by hand is left out.
 fn filled(unit: &str, machine: &Machine, command: &str, more: &[String]) -> String {
     let mut text = format!("# Made for {} by `taut deploy`.\n", machine.name);
+    let by_hand = more.iter().any(|line| line == STARTED_BY_A_PERSON);
+    let is_left_out = |line: &&str| {
+        line.starts_with("EnvironmentFile=") || (by_hand && line.starts_with("Restart"))
+    };
     let lines = unit.lines().skip_while(|line| line.starts_with('#'));
-    for line in lines.filter(|line| !line.starts_with("EnvironmentFile=")) {
+    for line in lines.filter(|line| !is_left_out(line)) {
         if line.starts_with("ExecStart=") {
             text.push_str(&format!("ExecStart={command}\n"));
             for line in more {
@@ -191,8 +198,16 @@ pub(in crate::commands) fn reached_by_a_service(device: &str) -> Result<Vec<Stri
     }
 }
 
-/// What the unit must be allowed for this device.
+/// What the unit must be allowed for this device, and whether it may start it again.
 fn allowed(choice: &DeviceChoice) -> Result<Vec<String>, String> {
+    let mut lines = reached(choice)?;
+    if choice.is_calibrated_when_opened() {
+        lines.push(STARTED_BY_A_PERSON.to_owned());
+    }
+    Ok(lines)
+}
+
+fn reached(choice: &DeviceChoice) -> Result<Vec<String>, String> {
     let on_serial = |port: &str| -> Result<Vec<String>, String> {
         Ok(vec![
             format!("DeviceAllow={} rw", quoted(port)?),
@@ -259,6 +274,32 @@ mod tests {
         let reached = reached_by_a_service("spidar:/dev/tty\nUser=root");
         let why = reached.expect_err("two lines");
         assert!(why.contains("control character"), "{why}");
+    }
+
+    #[test]
+    fn a_device_that_is_calibrated_when_opened_is_not_opened_again_by_itself() {
+        let machine = Machine {
+            name: "a".to_owned(),
+            address: std::net::Ipv4Addr::LOCALHOST.into(),
+            server: false,
+            nodes: Vec::new(),
+            device: None,
+            tracker: None,
+        };
+        for (device, is_calibrated) in [
+            ("spidar:/dev/ttyUSB0", true),
+            ("wooden", true),
+            ("polhem:/dev/ttyUSB0", false),
+            ("simulated", false),
+        ] {
+            let more = reached_by_a_service(device).expect(device);
+            for unit in [BRIDGE, SERVE] {
+                let text = filled(unit, &machine, "taut", &more);
+                let is_started_again = text.contains("Restart=on-failure");
+                assert_eq!(is_started_again, !is_calibrated, "{device}");
+                assert_eq!(text.contains("Restart=no"), is_calibrated, "{device}");
+            }
+        }
     }
 
     #[test]
