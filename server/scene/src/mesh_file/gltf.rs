@@ -424,6 +424,11 @@ fn check_accessor(accessor: &gltf::Accessor<'_>, buffers: &[Vec<u8>]) -> Result<
     })?;
     let length = buffers.get(view.buffer().index()).map_or(0, Vec::len);
     let stride = view.stride().unwrap_or(accessor.size());
+    if stride < accessor.size() {
+        return Err(format!(
+            "accessor {number} has elements that overlap (byteStride {stride}); export the file again"
+        ));
+    }
     let last = accessor
         .count()
         .checked_sub(1)
@@ -435,13 +440,8 @@ fn check_accessor(accessor: &gltf::Accessor<'_>, buffers: &[Vec<u8>]) -> Result<
     let view_end = view.offset().checked_add(view.length());
     let fits = end_in_view.is_some_and(|end| end <= view.length())
         && view_end.is_some_and(|end| end <= length);
-    if fits {
-        Ok(())
-    } else {
-        Err(format!(
-            "accessor {number} reaches past its buffer; export the file again"
-        ))
-    }
+    let past = || format!("accessor {number} reaches past its buffer; export the file again");
+    fits.then_some(()).ok_or_else(past)
 }
 
 /// RFC 4648, with or without padding; `None` for any other character.

@@ -183,6 +183,22 @@ fn a_mesh_with_a_skin_is_refused() {
     assert!(text.starts_with("mesh 0 has a skin"), "{text}");
 }
 
+/// The crate reads an element out of the bytes up to the next one, and panics where those are too few.
+#[test]
+fn elements_that_overlap_are_refused() {
+    for stride in [4, 8] {
+        let view = format!("\"byteLength\":36,\"byteStride\":{stride}}}");
+        let text = triangle("", 2).replace("\"byteLength\":36}", &view);
+        let text = parse(text.as_bytes(), None).unwrap_err().text;
+        assert_eq!(
+            text,
+            format!(
+                "mesh 0 primitive 0: accessor 1 has elements that overlap (byteStride {stride}); export the file again"
+            )
+        );
+    }
+}
+
 #[test]
 fn an_accessor_past_its_buffer_is_refused() {
     let text = triangle("", 2).replace(r#""count":3,"type":"VEC3""#, r#""count":4,"type":"VEC3""#);
