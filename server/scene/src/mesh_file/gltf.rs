@@ -12,7 +12,7 @@ use nalgebra::{Matrix4, Point3};
 use percent_encoding::percent_decode_str;
 
 use super::material::{Material, Materials};
-use super::read::{finite_vertex, is_below};
+use super::read::{below, finite_vertex};
 use super::{Fault, RawMesh};
 use crate::appearance::Appearance;
 use crate::files::{MAX_MESH_BYTES, read_bytes};
@@ -222,8 +222,8 @@ fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, 
                     let decoded = percent_decode_str(uri).decode_utf8().map_err(|_| {
                         Fault::new(format!("buffer {number} is `{uri}`, which is no text when its %.. are decoded; export it as .glb"))
                     })?;
-                    let named = Path::new(&*decoded);
-                    let directory = directory.filter(|_| is_below(named)).ok_or_else(|| {
+                    let beside = directory.zip(below(&decoded));
+                    let (directory, named) = beside.ok_or_else(|| {
                         Fault::new(format!("buffer {number} is `{uri}`, but must lie beside the file; export it as .glb"))
                     })?;
                     read_bytes(&directory.join(named), MAX_MESH_BYTES).map_err(|problem| {

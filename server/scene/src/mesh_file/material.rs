@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::RawMesh;
 use super::mtl::read_library;
-use super::read::is_below;
+use super::read::below;
 use crate::appearance::Appearance;
 
 /// Most materials that nobody defines which are named.
@@ -67,8 +67,8 @@ impl Materials {
         let mut lost = Vec::new();
         let mut all_read = true;
         for library in std::mem::take(&mut self.libraries) {
-            let inside = directory.filter(|_| is_below(Path::new(&library)));
-            let path = inside.map(|directory| directory.join(&library));
+            let inside = directory.zip(below(&library));
+            let path = inside.map(|(directory, name)| directory.join(name));
             let read = path.map(|path| read_library(&path, &mut self.list));
             all_read &= matches!(read, Some(Ok(_)));
             match read {

@@ -1,6 +1,6 @@
 //! Reading a mesh file of any known format.
 
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 use super::material::{FileLook, Materials};
 use super::{RawMesh, gltf, obj, ply, stl};
@@ -80,23 +80,23 @@ pub(crate) fn read_mesh_and_look(path: &Path) -> Result<(RawMesh, FileLook), Fil
 
 /// Names of the files that this mesh file is read with, relative to its folder, be they there or not: libraries of materials, buffers.
 /// None of a mesh that cannot be read: whoever reads it is told why.
-pub(crate) fn files_beside(path: &Path) -> Vec<String> {
+pub(crate) fn files_beside(path: &Path) -> Vec<PathBuf> {
     let named: fn(&[u8]) -> Vec<String> = match extension(path).as_str() {
         "obj" => obj::libraries,
         "glb" | "gltf" => gltf::buffer_files,
         _ => return Vec::new(),
     };
     let names = mesh_bytes(path).map_or_else(|_| Vec::new(), |bytes| named(&bytes));
-    names
-        .into_iter()
-        .filter(|name| !name.is_empty() && is_below(Path::new(name)))
-        .collect()
+    names.iter().filter_map(|name| below(name)).collect()
 }
 
-/// Whether a file of this name lies in the folder from which it is named, or below it.
-pub(super) fn is_below(name: &Path) -> bool {
+/// The name of a file in the folder from which it is named, or below it, without the `./` that programs write before it; `None` of one elsewhere.
+pub(super) fn below(name: &str) -> Option<PathBuf> {
+    let parts = Path::new(name).components();
+    let name: PathBuf = parts.filter(|part| *part != Component::CurDir).collect();
     let mut parts = name.components();
-    parts.all(|part| matches!(part, Component::Normal(_)))
+    let inside = parts.all(|part| matches!(part, Component::Normal(_)));
+    (inside && name.file_name().is_some()).then_some(name)
 }
 
 fn mesh_bytes(path: &Path) -> Result<Vec<u8>, Problem> {
@@ -194,6 +194,31 @@ mod tests {
                 prop_assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < mesh.vertices.len()));
                 prop_assert!(mesh.vertices.iter().all(|v| v.iter().all(|c| c.is_finite())));
             }
+        }
+    }
+
+    #[test]
+    fn a_library_that_is_named_from_its_folder_lies_beside_the_mesh() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.obj");
+        let library = directory.path().join("a.obj.mtl");
+        std::fs::write(&library, "newmtl red\nKd 1 0 0\n").unwrap();
+        for (named, is_beside) in [
+            ("./a.obj.mtl", true),
+            ("././a.obj.mtl", true),
+            ("./../a.obj.mtl", false),
+            (".", false),
+        ] {
+            let text = format!("mtllib {named}\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+            std::fs::write(&path, text).unwrap();
+            let (_, look) = read_mesh_and_look(&path).unwrap();
+            let red = is_beside.then_some([1.0, 0.0, 0.0]);
+            assert_eq!(
+                (look.appearance.color, look.lost.is_empty()),
+                (red, is_beside)
+            );
+            let known = is_beside.then(|| PathBuf::from("a.obj.mtl"));
+            assert_eq!(files_beside(&path), Vec::from_iter(known), "{named}");
         }
     }
 
