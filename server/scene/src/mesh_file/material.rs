@@ -31,6 +31,8 @@ pub(super) struct Materials {
     pub(super) libraries: Vec<String>,
     /// Vertices have colours of their own.
     pub(super) vertex_colours: bool,
+    /// Faces have.
+    pub(super) face_colours: bool,
 }
 
 /// How a mesh file says that its body looks.
@@ -113,6 +115,9 @@ impl Materials {
         }
         if self.vertex_colours {
             lost.push("its colours of vertices".to_owned());
+        }
+        if self.face_colours {
+            lost.push("its colours of faces".to_owned());
         }
         FileLook {
             appearance: material.appearance,

@@ -124,11 +124,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
     Ok(mesh)
 }
 
-/// Whether vertices have colours, which are not read.
-pub(super) fn has_colours(bytes: &[u8]) -> bool {
+/// Whether elements of this name have colours, which are not read.
+pub(super) fn has_colours(bytes: &[u8], name: &str) -> bool {
     let coloured = |element: &Element| {
         let mut properties = element.properties.iter();
-        element.name == "vertex" && properties.any(|property| property.name == "red")
+        element.name == name && properties.any(|property| property.name == "red")
     };
     header(bytes).is_ok_and(|(_, elements, _)| elements.iter().any(coloured))
 }

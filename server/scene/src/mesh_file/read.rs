@@ -117,11 +117,15 @@ fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<(RawMesh, Materials), Fault> 
     let mut materials = Materials::default();
     let mesh = match extension(path).as_str() {
         "ply" => {
-            materials.vertex_colours = ply::has_colours(bytes);
+            materials.vertex_colours = ply::has_colours(bytes, "vertex");
+            materials.face_colours = ply::has_colours(bytes, "face");
             ply::parse(bytes)
         }
         "obj" => obj::parse(bytes, &mut materials),
-        "stl" => stl::parse(bytes),
+        "stl" => {
+            materials.face_colours = stl::has_colours(bytes);
+            stl::parse(bytes)
+        }
         "glb" | "gltf" => gltf::parse(bytes, path.parent(), &mut materials),
         _ => Err(Fault::new(
             "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf",
@@ -219,6 +223,27 @@ mod tests {
             );
             let known = is_beside.then(|| PathBuf::from("a.obj.mtl"));
             assert_eq!(files_beside(&path), Vec::from_iter(known), "{named}");
+        }
+    }
+
+    #[test]
+    fn colours_of_faces_are_said_not_to_be_drawn() {
+        let lost = |name: &str, bytes: &[u8]| {
+            let (mesh, materials) = parse_mesh(Path::new(name), bytes).unwrap();
+            materials.look(&mesh, None).lost
+        };
+        let plain = [&[0_u8; 80][..], &[1, 0, 0, 0], &[0; 50]].concat();
+        assert_eq!(lost("a.stl", &plain), [""; 0]);
+        let [mut behind_triangle, mut in_header] = [plain.clone(), plain];
+        behind_triangle[133] = 0x80;
+        in_header[..6].copy_from_slice(b"COLOR=");
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nproperty uchar red\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255\n";
+        for (name, bytes) in [
+            ("a.stl", &behind_triangle[..]),
+            ("a.stl", &in_header),
+            ("a.ply", ply.as_bytes()),
+        ] {
+            assert_eq!(lost(name, bytes), ["its colours of faces"]);
         }
     }
 

@@ -35,6 +35,19 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
     Ok(mesh.welded())
 }
 
+/// Whether triangles of a binary file have colours, which are not read: where bit 15 behind a triangle is set (VisCAM), or the header has `COLOR=`
+/// (Materialise).
+pub(super) fn has_colours(bytes: &[u8]) -> bool {
+    let Some((header, triangles)) = bytes.split_at_checked(HEADER_BYTES) else {
+        return false;
+    };
+    let in_header = header.windows(6).any(|word| word == b"COLOR=");
+    let mut last_bytes = triangles
+        .chunks_exact(TRIANGLE_BYTES)
+        .map(|triangle| triangle[TRIANGLE_BYTES - 1]);
+    !is_text(bytes) && (in_header || last_bytes.any(|byte| byte & 0x80 != 0))
+}
+
 /// Whether the file begins as a text does. A binary file may do so, too, but its count of triangles has a byte of 0.
 fn is_text(bytes: &[u8]) -> bool {
     let start = without_mark(bytes).trim_ascii_start();
