@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::finished_file::free_name;
 use crate::problem::Problem;
 
 /// Written beside its place under a name of its own. Dropped before it is finished, it leaves nothing.
@@ -28,7 +29,8 @@ impl NewFolder {
         let mut partial_name = std::ffi::OsString::from(".");
         partial_name.push(name);
         partial_name.push(format!(".{}.partial", std::process::id()));
-        let partial = path.with_file_name(partial_name);
+        // A process of this number may have left its own there.
+        let partial = free_name(&path.with_file_name(partial_name));
         fs::create_dir(&partial).map_err(|error| {
             fail(format!(
                 "cannot be made ({error}); check that the folder it goes into exists and may be written"
@@ -67,5 +69,23 @@ impl Drop for NewFolder {
     fn drop(&mut self) {
         // Finished, there is nothing to remove; otherwise a failure to remove has nobody left to be told to.
         let _ = fs::remove_dir_all(&self.partial);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_process_of_this_number_left_is_in_nobodys_way() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("part");
+        let left = format!(".part.{}.partial", std::process::id());
+        let left = directory.path().join(left);
+        fs::create_dir(&left).unwrap();
+        let folder = NewFolder::create(&path).unwrap();
+        folder.write("part.ply", b"whole").unwrap();
+        folder.finish().unwrap();
+        assert!(path.join("part.ply").is_file() && left.is_dir());
     }
 }
