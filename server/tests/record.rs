@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use taut_bridge::signals::is_ignored;
 
-use crate::support::{PATIENCE, Running, Workplace, taut, wait_until};
+use crate::support::{PATIENCE, Running, Workplace, taut, wait_until, workbench};
 
 /// Times of the rows of a trace, s.
 fn times(trace: &Path) -> Vec<f64> {
@@ -91,6 +91,29 @@ fn a_recording_ends_with_the_server_that_stops_unless_told_to_stay() {
     assert!(staying.runs(), "it was told to stay");
     assert!(staying.end("-TERM").status.success());
     assert!(times(&place.path("staying.csv")).len() > 100);
+}
+
+#[test]
+fn the_duration_of_a_recording_ends_where_the_device_is_silent_too() {
+    let place = Workplace::new();
+    let text = workbench();
+    // A bridge that nobody runs.
+    let remote = text.replacen("kind = \"simulated\"", "kind = \"remote\"", 1);
+    assert_ne!(remote, text);
+    let silent = remote
+        .replacen("tremor = ", "# tremor = ", 1)
+        .replacen("seed = ", "# seed = ", 1);
+    place.write("workbench.toml", &silent);
+    let free = UdpSocket::bind(("127.0.0.1", 0))
+        .and_then(|socket| socket.local_addr())
+        .expect("no port");
+    let (address, key) = (free.to_string(), place.text("cluster.key"));
+    let out = place.text("trace.csv");
+    let _server = Running::start(&place.serve("workbench.toml", "120", &["--quic", &address]));
+    let record = ["record", "--server", &address, "--key", &key, "--out", &out];
+    let mut recorder = Running::start(&[&record[..], &["--stay", "--duration", "0.1"]].concat());
+    wait_until("the recording goes on", || !recorder.runs());
+    assert_eq!(times(&place.path("trace.csv")).first(), Some(&0.0));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use taut_bridge::service_manager::{ServiceNotifier, Turns};
 use taut_link::{
-    ClientLink, ClientOptions, LinkError, LinkHealth, ReceivedState, RejoinPolicy, Renewal, Role,
+    ClientLink, ClientOptions, LinkError, ReceivedState, RejoinPolicy, Renewal, Role,
     SupervisedLink,
 };
 use taut_proto::SceneDescription;
@@ -163,11 +163,8 @@ impl Recorder {
             for received in states.drain(..) {
                 self.trace.row(&received, now)?;
             }
-            let reached = match supervised.health() {
-                LinkHealth::Connected => self.trace.last_time_s,
-                // Nothing comes, and time goes on all the same.
-                _ => self.trace.age_s(now),
-            };
+            // Where nothing comes, or the device is silent, time goes on all the same.
+            let reached = self.trace.age_s(now);
             if duration.is_some_and(|wanted| reached >= wanted) {
                 return Ok(());
             }
