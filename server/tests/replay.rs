@@ -45,6 +45,29 @@ fn pressed(more: &[&str]) -> (serde_json::Value, String) {
 }
 
 #[test]
+fn the_answer_replaces_no_file_that_the_scene_names() {
+    let directory = temporary();
+    let path = |name: &str| directory.path().join(name);
+    let scene = "name = \"x\"\n[god_object]\nshape = { sphere = { radius = 0.01 } }\nmass = 1.0\n\
+        [[obstacle]]\nname = \"plate\"\nshape = { box = { half_extents = [0.01, 0.01, 0.01] } }\n\
+        motion = { trace = \"out.csv\" }\n";
+    let trace = "t,x,y,z,qw,qx,qy,qz\n0,0,0,-0.1,1,0,0,0\n1,0,0,-0.2,1,0,0,0\n";
+    for (name, text) in [
+        ("scene.toml", scene),
+        ("hand.csv", trace),
+        ("out.csv", trace),
+    ] {
+        assert!(std::fs::write(path(name), text).is_ok());
+    }
+    let scene = path("scene.toml").display().to_string();
+    let output = replay(directory.path(), &scene, &[]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("it is read for this answer"), "{said}");
+    assert!(std::fs::read_to_string(path("out.csv")).is_ok_and(|text| text == trace));
+}
+
+#[test]
 fn the_same_trace_gives_the_same_bytes_and_a_complete_report() {
     let mut answers = Vec::new();
     for rate in ["250", "250", "70"] {

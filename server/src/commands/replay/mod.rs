@@ -39,10 +39,11 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
             "a replay needs --scene, --trace and --out, or --recording",
         ));
     };
-    let inputs = [Path::new(scene), trace.as_path()];
+    let named = [Path::new(scene), trace.as_path()];
     let scene = Scene::named_or_file(scene)?.with_overrides(&args.overrides)?;
     let trace = DeviceTrace::load(trace)?;
     let built = scene.build()?;
+    let files = scene.files()?;
     let mut settings = built.settings;
     if let Some(solver) = args.solver {
         settings.solver = solver.into();
@@ -75,6 +76,8 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
             out.display()
         ))
     };
+    let of_scene = files.iter().map(|(_, found)| found.as_path());
+    let inputs: Vec<&Path> = named.into_iter().chain(of_scene).collect();
     let file = FinishedFile::create(out, &inputs).map_err(cannot_write)?;
     let mut writer = ReplayWriter::new(file, args.timings).map_err(cannot_write)?;
     write_answers(&mut replay, &trace, &mut writer, &interrupted).map_err(cannot_write)?;
