@@ -57,21 +57,25 @@ fn is_text(bytes: &[u8]) -> bool {
     }) && !bytes.contains(&0)
 }
 
-/// The solids of a text, each for itself, without its name and in small letters: the crate reads to the first `endsolid`, and no capitals.
+/// The solids of a text, each for itself, without its name and its normals and in small letters: the crate reads to the first `endsolid`, and no capitals.
 fn solids(bytes: &[u8]) -> Result<Vec<String>, Fault> {
     let text = String::from_utf8_lossy(without_mark(bytes)).to_ascii_lowercase();
     let mut solids: Vec<String> = Vec::new();
     let mut open: Option<String> = None;
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
-        let Some(word) = line.split_whitespace().next() else {
+        let mut words = line.split_whitespace();
+        let Some(word) = words.next() else {
             continue;
         };
+        let is_facet = word == "facet" && words.next() == Some("normal") && words.count() == 3;
         match (word, &mut open) {
             ("solid", None) => open = Some("solid \n".to_owned()),
             ("endsolid", Some(solid)) => {
                 solid.push_str("endsolid\n");
                 solids.extend(open.take());
             }
+            // The corners say it; of a triangle without area some programs write what is no number.
+            (_, Some(solid)) if is_facet => solid.push_str("facet normal 0 0 0\n"),
             (_, Some(solid)) => {
                 solid.push_str(line);
                 solid.push('\n');
@@ -173,6 +177,28 @@ mod tests {
         assert_eq!(parse(&capitals).unwrap().triangles, [[0, 1, 2]]);
         let marked = [b"\xEF\xBB\xBF", &text[..]].concat();
         assert_eq!(parse(&marked).unwrap().triangles, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn a_normal_that_is_no_number_is_no_fault_of_the_triangle() {
+        let of = |normal: &str| {
+            let text = format!(
+                "solid a\nfacet {normal}\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
+            );
+            parse(text.as_bytes())
+        };
+        for normal in [
+            "nan nan nan",
+            "-nan(ind) 0 0",
+            "-1.#IND -1.#IND 0",
+            "inf 0 0",
+        ] {
+            let mesh = of(&format!("normal {normal}")).unwrap();
+            assert_eq!(mesh.triangles, [[0, 1, 2]], "{normal}");
+        }
+        for broken in ["normal 0 0", "normal 0 0 1 0", "0 0 0 1"] {
+            assert!(of(broken).is_err(), "{broken}");
+        }
     }
 
     #[test]
