@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Similarity3};
 use taut_proto::{Finish, Panorama};
 use taut_render::environment::Environment;
 use taut_render::renderer::shapes;
-use taut_render::stage::Stage;
+use taut_render::stage::{Stage, StageBody};
 
 const PIXELS: (u32, u32) = (360, 240);
 
@@ -111,4 +111,25 @@ fn matt_surfaces_take_the_colour_of_the_light_that_they_face() {
     assert!(red > green + 20, "{red} {green}");
     let [red, green, _] = at(&picture, -0.85, -0.1);
     assert!(green > red, "{red} {green}");
+}
+
+/// A room of 8 m whose walls are felt and not seen: its size is not that of what casts shadows.
+#[test]
+fn a_body_that_is_not_drawn_leaves_light_and_shadows_as_they_are() {
+    let drawn = |with_room: bool| {
+        let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
+        if with_room {
+            stage.meshes.push(shapes::cuboid([4.0; 3]).into());
+            stage.obstacles.push(StageBody {
+                mesh: 2,
+                opacity: 0.0,
+                ..stage.obstacles[0]
+            });
+        }
+        crate::support::draw(stage, Isometry3::translation(0.0, -0.042, 0.0))
+    };
+    let Some(alone) = drawn(false) else {
+        return;
+    };
+    assert!(drawn(true).expect("drawn before") == alone);
 }

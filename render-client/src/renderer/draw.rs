@@ -247,7 +247,7 @@ impl Renderer {
         let god_object = god_object::instance(stage, &state.god_object);
         add(&stage.god_object, god_object, bounds);
         let moving = usize::from(stage.god_object.opacity >= 1.0);
-        for body in &stage.obstacles {
+        for body in stage.obstacles.iter().filter(|body| body.opacity > 0.0) {
             let pose = pose_of(body, state);
             let own = self.bounds(stage, body, pose);
             bounds = bounds.union(&own);
