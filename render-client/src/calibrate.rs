@@ -60,9 +60,17 @@ impl Calibration {
         let mut stage = description::stage(workbench, found, &meshes, None, &overrides)?;
         for screen in &mut stage.screens {
             let correction = screen.correction.take().unwrap_or_default();
-            let mesh = correction.mesh(0);
-            let chart = Chart::new(&screen.name, &screen.screen, screen.pixels, &mesh);
-            screen.chart = Some(Arc::new(chart));
+            // An output lights its own part of the screen: where there is one for each eye, each has a picture of its own.
+            let chart = |picture: usize| {
+                let mesh = correction.mesh(picture);
+                Arc::new(Chart::new(
+                    &screen.name,
+                    &screen.screen,
+                    screen.pixels,
+                    &mesh,
+                ))
+            };
+            screen.charts = (0..correction.meshes.len().max(1)).map(chart).collect();
             screen.correction = Some(correction);
         }
         Ok(Self {
@@ -126,30 +134,75 @@ fn speck() -> Result<MeshBlob, RenderError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use taut_proto::scene::{NodeDescription, ScreenDescription, Stereo, WindowDescription};
+    use taut_proto::scene::{
+        NodeDescription, OutputDescription, ScreenDescription, Stereo, WindowDescription,
+    };
+
+    fn workbench(stereo: Stereo, output: OutputDescription) -> SceneDescription {
+        let mut workbench = SceneDescription::of_body("nothing", Calibration::body());
+        workbench.screens.push(ScreenDescription {
+            name: "front".into(),
+            lower_left: [-0.9, 0.0, 0.0],
+            lower_right: [0.9, 0.0, 0.0],
+            upper_left: [-0.9, 0.0, 1.2],
+            output,
+        });
+        workbench.nodes.push(NodeDescription {
+            name: "wall".into(),
+            screens: vec!["front".into()],
+            stereo,
+            window: WindowDescription {
+                width: 1920,
+                height: 1080,
+                fullscreen: false,
+            },
+            monitors: Vec::new(),
+        });
+        workbench
+    }
+
+    /// Points of the wall between two places along it, as a map of two by two.
+    fn part_of_the_wall(from: f32, to: f32) -> Vec<u8> {
+        let across = [0.25, 0.75].map(|share| from + share * (to - from));
+        let points = [0.3_f32, 0.9].map(|z| across.map(|x| [x, 0.0, z]));
+        let values = points.into_iter().flatten().flatten();
+        let header = b"PF\n2 2\n-1.0\n".iter().copied();
+        header.chain(values.flat_map(f32::to_le_bytes)).collect()
+    }
+
+    #[test]
+    fn each_eye_s_output_has_the_picture_of_the_part_that_it_lights() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let lit = [("left.pfm", -0.9, 0.5), ("right.pfm", -0.5, 0.9)];
+        for (name, from, to) in lit {
+            let written = std::fs::write(folder.path().join(name), part_of_the_wall(from, to));
+            written.expect("written");
+        }
+        let output = OutputDescription {
+            surface: vec!["left.pfm".into(), "right.pfm".into()],
+            ..OutputDescription::default()
+        };
+        let workbench = workbench(Stereo::TwoWindows, output);
+        let calibration = Calibration::new(&workbench, "wall", folder.path()).expect("a node");
+        for (picture, (_, from, to)) in lit.into_iter().enumerate() {
+            let chart = calibration.stage.screens[0].chart(picture);
+            let quads = chart.expect("a picture").quads().iter();
+            // Without letters, which may stand beyond the edge.
+            let filled = quads.filter(|quad| quad.letter.is_none());
+            let places = filled.flat_map(|quad| quad.corners.map(|corner| corner.x));
+            let ends = places.fold((0.0_f64, 0.0_f64), |(low, high), x| {
+                (low.min(x), high.max(x))
+            });
+            // Lines along the edges are a few pixels of 0.7 mm wide.
+            let off = (ends.0 - f64::from(from)).abs() + (ends.1 - f64::from(to)).abs();
+            assert!(off < 0.02, "{ends:?} of {from} to {to}");
+        }
+    }
 
     #[test]
     fn windows_are_as_large_as_the_workbench_file_says_in_any_stereo_mode() {
         for (_, stereo) in Stereo::NAMED {
-            let mut workbench = SceneDescription::of_body("nothing", Calibration::body());
-            workbench.screens.push(ScreenDescription {
-                name: "front".into(),
-                lower_left: [-0.9, 0.0, 0.0],
-                lower_right: [0.9, 0.0, 0.0],
-                upper_left: [-0.9, 0.0, 1.2],
-                output: Default::default(),
-            });
-            workbench.nodes.push(NodeDescription {
-                name: "wall".into(),
-                screens: vec!["front".into()],
-                stereo,
-                window: WindowDescription {
-                    width: 1920,
-                    height: 1080,
-                    fullscreen: false,
-                },
-                monitors: Vec::new(),
-            });
+            let workbench = workbench(stereo, OutputDescription::default());
             let calibration = Calibration::new(&workbench, "wall", Path::new(""));
             let stage = calibration.expect("a node").in_windows();
             assert_eq!(stage.screens[0].pixels, (1920, 1080), "{stereo:?}");

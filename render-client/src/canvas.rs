@@ -160,7 +160,7 @@ pub(crate) fn target_of(
             let corrected = Corrected {
                 correction,
                 picture: place,
-                chart: screen.chart.as_deref(),
+                chart: screen.chart(place),
             };
             renderer.corrected_picture(gpu, picture, size, &corrected)
         }

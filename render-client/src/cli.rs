@@ -90,10 +90,10 @@ pub struct RenderArgs {
     /// Show the two eyes in this way, whatever the server says.
     #[arg(long, value_name = "MODE", value_parser = stereo_modes())]
     pub stereo: Option<Stereo>,
-    /// Width of a view in pixels [default: the window of the workbench file; 480 off-screen without --out].
+    /// Width of a window in pixels, off-screen of one eye's view [default: the window of the workbench file; 480 off-screen without --out].
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub width: Option<u32>,
-    /// Height of a view in pixels.
+    /// Height of the same.
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub height: Option<u32>,
     /// Monitors of the windows in order, by name (DP-1) or number from 0, whatever the server says; further windows take

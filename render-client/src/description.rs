@@ -187,7 +187,7 @@ fn stage_screen(
         screen,
         stereo,
         correction: correction.map(Arc::new),
-        chart: None,
+        charts: Vec::new(),
     })
 }
 

@@ -148,10 +148,13 @@ impl Hold {
         (ahead > 0.0 && ahead.is_finite()).then(|| eye + ray * ahead)
     }
 
-    /// Moves G on the workbench, unless that takes it too near to the eye or too far away.
+    /// Moves G on the workbench, unless that takes it too near to the eye or too far away. One that is, comes back step by step.
     fn shift(&mut self, displacement: &Vector3<f64>, eye: &Point3<f64>) {
-        let distance = (self.grip() + displacement - eye).norm();
-        let in_reach = (NEAREST..=FARTHEST).contains(&distance); // false for NaN
+        let beyond = |grip: Point3<f64>| {
+            let distance = (grip - eye).norm();
+            (distance - distance.clamp(NEAREST, FARTHEST)).abs()
+        };
+        let in_reach = beyond(self.grip() + displacement) <= beyond(self.grip()); // false for NaN
         if in_reach {
             let in_world = self
                 .workbench_from_world
@@ -282,23 +285,12 @@ mod tests {
     fn what_is_let_go_stays_at_the_god_object_and_is_taken_up_there() {
         let mut hold = hold();
         let god_object = Isometry3::translation(0.01, 0.02, 0.03);
+        let (from, to) = (place(0.5, 0.5), place(0.6, 0.5));
         hold.toggle(&god_object);
-        hold.drag(
-            Drag::Along,
-            &screen(),
-            &eye(),
-            place(0.5, 0.5),
-            place(0.6, 0.5),
-        );
+        hold.drag(Drag::Along, &screen(), &eye(), from, to);
         assert_eq!((hold.is_held(), *hold.target()), (false, god_object));
         hold.toggle(&god_object);
-        hold.drag(
-            Drag::Along,
-            &screen(),
-            &eye(),
-            place(0.5, 0.5),
-            place(0.6, 0.5),
-        );
+        hold.drag(Drag::Along, &screen(), &eye(), from, to);
         assert!(hold.is_held() && *hold.target() != god_object);
         hold.reset();
         assert_eq!(*hold.target(), hold.start);
@@ -320,6 +312,19 @@ mod tests {
         hold.toggle(&start);
         hold.follow(begun);
         assert!(!hold.is_held() && *hold.target() == begun.start);
+    }
+
+    #[test]
+    fn what_is_out_of_reach_comes_back_by_steps_and_goes_no_further() {
+        for (away, back) in [(0.1, 0.01), (12.0, -0.01)] {
+            for (upward, moves) in [(back, true), (-back, false)] {
+                let (ahead, to) = (-screen().normal() * away, place(0.5, 0.5 + upward));
+                let start = Isometry3::from(eye().coords + ahead);
+                let mut hold = Hold::at(start, Point3::origin(), Similarity3::identity());
+                hold.drag(Drag::Depth, &screen(), &eye(), place(0.5, 0.5), to);
+                assert_eq!(*hold.target() != start, moves, "{upward} from {away} m");
+            }
+        }
     }
 
     #[test]

@@ -56,8 +56,8 @@ pub struct StageScreen {
     pub stereo: Stereo,
     /// What is done to its pictures; `None` shows them as they are drawn.
     pub correction: Option<Arc<Correction>>,
-    /// Drawn instead of the scene, by `taut calibrate`; only where there is a correction.
-    pub chart: Option<Arc<Chart>>,
+    /// Drawn instead of the scene, by `taut calibrate`, and only where there is a correction. Of two the first is the left eye's.
+    pub charts: Vec<Arc<Chart>>,
 }
 
 /// A body to draw.
@@ -100,6 +100,12 @@ pub struct Bounds {
 }
 
 impl StageScreen {
+    /// What is drawn instead of the scene in the picture at this place among those of the screen.
+    pub fn chart(&self, picture: usize) -> Option<&Chart> {
+        let chart = self.charts.get(picture).or(self.charts.first());
+        chart.map(|chart| &**chart)
+    }
+
     /// Whether a place of a picture is not where it was drawn.
     pub fn is_warped(&self) -> bool {
         let correction = self.correction.as_ref();

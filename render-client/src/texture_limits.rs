@@ -74,7 +74,7 @@ mod tests {
             pixels,
             stereo,
             correction: None,
-            chart: None,
+            charts: Vec::new(),
         }
     }
 

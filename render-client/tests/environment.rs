@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Similarity3};
 use taut_proto::{Finish, Panorama};
 use taut_render::environment::Environment;
 use taut_render::renderer::shapes;
-use taut_render::stage::Stage;
+use taut_render::stage::{Stage, StageBody};
 
 const PIXELS: (u32, u32) = (360, 240);
 
@@ -111,4 +111,51 @@ fn matt_surfaces_take_the_colour_of_the_light_that_they_face() {
     assert!(red > green + 20, "{red} {green}");
     let [red, green, _] = at(&picture, -0.85, -0.1);
     assert!(green > red, "{red} {green}");
+}
+
+/// A room of 8 m whose walls are felt and not seen: its size is not that of what casts shadows.
+#[test]
+fn a_body_that_is_not_drawn_leaves_light_and_shadows_as_they_are() {
+    let drawn = |with_room: bool| {
+        let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
+        if with_room {
+            stage.meshes.push(shapes::cuboid([4.0; 3]).into());
+            stage.obstacles.push(StageBody {
+                mesh: 2,
+                opacity: 0.0,
+                ..stage.obstacles[0]
+            });
+        }
+        crate::support::draw(stage, Isometry3::translation(0.0, -0.042, 0.0))
+    };
+    let Some(alone) = drawn(false) else {
+        return;
+    };
+    assert!(drawn(true).expect("drawn before") == alone);
+}
+
+/// Two panes in one plane, the middle of each nearer to another eye.
+#[test]
+fn both_eyes_see_translucent_bodies_over_each_other_in_one_order() {
+    let mut stage = peg_in_hole(PIXELS, Stereo::TwoWindows);
+    stage.screens.truncate(1);
+    stage.head = Isometry3::translation(0.0, -1.2, 0.6);
+    stage.workbench_from_scene = Similarity3::identity();
+    stage.meshes.push(shapes::cuboid([0.3, 0.01, 0.2]).into());
+    let pane = |x: f64, colour: [f32; 3]| StageBody {
+        mesh: 2,
+        pose: Isometry3::translation(x, 0.0, 0.6),
+        colour,
+        opacity: 0.8,
+        ..stage.god_object
+    };
+    stage.obstacles = vec![pane(-0.1, [0.8, 0.02, 0.02]), pane(0.1, [0.02, 0.7, 0.02])];
+    let Some(pictures) = crate::support::draw(stage, Isometry3::identity()) else {
+        return;
+    };
+    let [left, right] = [0, 1].map(|eye: usize| {
+        let [red, green, ..] = pictures[eye].get_pixel(180, 120).0;
+        red > green
+    });
+    assert_eq!(left, right, "red is in front");
 }

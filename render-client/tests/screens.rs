@@ -507,7 +507,7 @@ fn the_calibration_picture_of_a_cylinder_has_its_lines_where_a_tape_measure_has(
         stage.head = Isometry3::translation(head[0], head[1], head[2]);
         let chart = Chart::new("wall", &chord(), PIXELS, &surface);
         meshes(&mut stage, std::slice::from_ref(&surface));
-        stage.screens[0].chart = Some(Arc::new(chart));
+        stage.screens[0].charts = vec![Arc::new(chart)];
         let Some(pictures) = draw(stage, Isometry3::identity()) else {
             return;
         };

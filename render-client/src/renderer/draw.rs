@@ -247,7 +247,7 @@ impl Renderer {
         let god_object = god_object::instance(stage, &state.god_object);
         add(&stage.god_object, god_object, bounds);
         let moving = usize::from(stage.god_object.opacity >= 1.0);
-        for body in &stage.obstacles {
+        for body in stage.obstacles.iter().filter(|body| body.opacity > 0.0) {
             let pose = pose_of(body, state);
             let own = self.bounds(stage, body, pose);
             bounds = bounds.union(&own);
@@ -349,11 +349,11 @@ impl Renderer {
             |pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget, seen: Option<Point3<f64>>| {
                 enter(pass, picture, view);
                 match (seen, chart) {
-                    (Some(eye), None) => {
+                    (Some(_), None) => {
                         let [_, _, width, height] = pixels_of(view, picture.size);
                         let (planes, size) = (&self.clip_planes, (width, height));
                         let sight = Magnification::new(screen, eyes, planes, size);
-                        self.draw_view(pass, view, (&eye, &sight));
+                        self.draw_view(pass, view, (&eyes.position(Eye::Middle), &sight));
                     }
                     (Some(eye), Some(chart)) => {
                         let clip = screen.clip_from_workbench(&eye, &self.clip_planes);
@@ -409,7 +409,7 @@ impl Renderer {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         view: &ViewTarget,
-        (eye, sight): (&Point3<f64>, &Magnification),
+        (middle, sight): (&Point3<f64>, &Magnification),
     ) {
         let per_metre = |it: &Bounds| sight.most_pixels_per_metre(&it.center, it.radius);
         pass.set_bind_group(0, &view.group, &[]);
@@ -422,24 +422,24 @@ impl Renderer {
         pass.draw(0..4, 0..1);
         pass.set_pipeline(&self.pipelines.background);
         pass.draw(0..3, 0..1);
-        self.draw_translucent(pass, eye, &per_metre);
+        self.draw_translucent(pass, middle, &per_metre);
         if let Some(ghost) = &self.plan.ghost {
             pass.set_pipeline(&self.pipelines.ghost);
             self.draw_batches(pass, std::slice::from_ref(ghost), &per_metre);
         }
     }
 
-    /// The farthest first, by their middles: a body within another one is drawn as if beside it.
+    /// The farthest first, by their middles and the `middle` of the eyes, which see one order: a body within another one is drawn as if beside it.
     fn draw_translucent(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        eye: &Point3<f64>,
+        middle: &Point3<f64>,
         per_metre: &dyn Fn(&Bounds) -> f64,
     ) {
         if self.plan.translucent.is_empty() {
             return;
         }
-        let away = |batch: &Batch| (batch.bounds.center - eye).norm_squared();
+        let away = |batch: &Batch| (batch.bounds.center - middle).norm_squared();
         let mut order: Vec<&Batch> = self.plan.translucent.iter().collect();
         order.sort_by(|a, b| away(b).total_cmp(&away(a)));
         pass.set_pipeline(&self.pipelines.translucent);

@@ -49,7 +49,7 @@ pub(crate) fn peg_in_hole(pixels: (u32, u32), stereo: Stereo) -> Stage {
                 pixels,
                 stereo,
                 correction: None,
-                chart: None,
+                charts: Vec::new(),
             })
             .collect(),
         head: Isometry3::translation(0.12, -1.1, 0.85),

@@ -12,6 +12,7 @@ mod colours;
 mod error;
 mod guard;
 mod guests;
+mod head;
 mod history;
 mod hosted;
 mod inspect;

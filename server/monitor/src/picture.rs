@@ -2,11 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 use rerun::{
-    Arrows3D, Ellipsoids3D, EntityPath, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion,
-    RecordingStream, RecordingStreamResult, Transform3D, ViewCoordinates,
+    Arrows3D, EntityPath, LineStrips3D, Mesh3D, Points3D, Quaternion, RecordingStream,
+    RecordingStreamResult, Transform3D, ViewCoordinates,
 };
 
 use crate::error::MonitorError;
+use crate::head::Head;
 use crate::sample::MonitorSample;
 use crate::scene::{BodyRole, MonitorBody, MonitorScene, Pose};
 use crate::{colours, paths, shading};
@@ -20,30 +21,21 @@ const FORCE_RADIUS: f64 = 0.012;
 const NEWTONS_PER_DIAGONAL: f64 = 8.0;
 /// Forces below this are not drawn, N: the arrow would be shorter than it is thick.
 const LEAST_DRAWN_FORCE: f64 = 0.01;
-/// Half sizes of the head, metres: width, depth, height.
-const HEAD_HALF_SIZES: [f32; 3] = [0.075, 0.095, 0.115];
 
 /// Draws; holds what the moving part needs of the scene.
 pub(crate) struct Picture {
     reference_point: Point3<f64>,
     diagonal: f64,
     metres_per_newton: f64,
-    head: Option<Head>,
+    head: Head,
     /// Path of each obstacle that moves; `None` for one at rest. In the scene's order of obstacles.
     moving: Vec<Option<EntityPath>>,
     /// Session time at which no contacts were last sent, in nanoseconds; `None` while some may be drawn.
     erased_ns: Option<u64>,
 }
 
-/// The head where it was last sent. It is sent again now and then although it may not move: an observer who joins
-/// late gets the newest history first, the oldest is thrown away, and one who is slow is not sent all.
-struct Head {
-    pose: Pose,
-    sent_ns: u64,
-}
-
 /// Time after which what has not changed is sent again: an unmoved head, that there are no contacts.
-const REPEAT_NS: u64 = 1_000_000_000;
+pub(crate) const REPEAT_NS: u64 = 1_000_000_000;
 
 /// Says what is wrong with a body's mesh, if anything.
 pub(crate) fn check_mesh(body: &MonitorBody) -> Result<(), MonitorError> {
@@ -92,11 +84,7 @@ impl Picture {
                 .with_radii([rerun::Radius::new_ui_points(1.0)]);
             stream.log_static(paths::named("world/screens", &screen.name), &outline)?;
         }
-        let head = scene.head.map(|pose| Head { pose, sent_ns: 0 });
-        if let Some(head) = &head {
-            draw_head(stream)?;
-            stream.log(paths::HEAD, &transform(&head.pose))?;
-        }
+        let head = Head::draw(stream, scene)?;
 
         let diagonal = god_object_diagonal(scene);
         Ok(Picture {
@@ -142,38 +130,11 @@ impl Picture {
                 stream.log(path.clone(), &transform(pose))?;
             }
         }
-        self.show_head(stream, sample)?;
+        self.head
+            .show(stream, sample.head_pose, sample.session_time_ns)?;
         self.show_contacts(stream, sample)?;
         self.show_force(stream, sample)?;
         Ok(true)
-    }
-
-    fn show_head(
-        &mut self,
-        stream: &RecordingStream,
-        sample: &MonitorSample,
-    ) -> RecordingStreamResult<()> {
-        let Some(pose) = sample
-            .head_pose
-            .or(self.head.as_ref().map(|head| head.pose))
-        else {
-            return Ok(());
-        };
-        let now_ns = sample.session_time_ns;
-        match &self.head {
-            None => draw_head(stream)?,
-            Some(head) => {
-                let recent = now_ns.saturating_sub(head.sent_ns) < REPEAT_NS;
-                if recent && head.pose == pose {
-                    return Ok(());
-                }
-            }
-        }
-        self.head = Some(Head {
-            pose,
-            sent_ns: now_ns,
-        });
-        stream.log(paths::HEAD, &transform(&pose))
     }
 
     /// As long as there is nothing to draw, that is sent now and then, as the head is.
@@ -281,13 +242,6 @@ fn moving_paths(scene: &MonitorScene) -> Vec<Option<EntityPath>> {
         .collect()
 }
 
-fn draw_head(stream: &RecordingStream) -> RecordingStreamResult<()> {
-    let shape = Ellipsoids3D::from_half_sizes([HEAD_HALF_SIZES])
-        .with_colors([colours::WORKBENCH])
-        .with_fill_mode(FillMode::MajorWireframe);
-    stream.log_static(paths::HEAD, &shape)
-}
-
 /// Largest extent of the god-object's bounding box, corner to corner; of all bodies if there is no god-object.
 fn god_object_diagonal(scene: &MonitorScene) -> f64 {
     let god_object = scene
@@ -349,7 +303,7 @@ fn view_coordinates(up: &Vector3<f64>) -> ViewCoordinates {
     }
 }
 
-fn transform(pose: &Pose) -> Transform3D {
+pub(crate) fn transform(pose: &Pose) -> Transform3D {
     let rotation = pose.rotation.coords.map(|x| x as f32); // x, y, z, w
     Transform3D::from_translation_rotation(
         to_vector(pose.translation.vector),

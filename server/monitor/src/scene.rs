@@ -18,6 +18,8 @@ pub struct MonitorScene {
     pub screens: Vec<MonitorScreen>,
     /// Where the viewer's head starts; a sample may move it. `None` draws no head.
     pub head: Option<Pose>,
+    /// Size of the head in the picture over its true size: that of a workbench whose scene is magnified is as much smaller.
+    pub head_size: f64,
     /// The reference point G, in the god-object's body frame: the force arrow starts there.
     pub reference_point: Point3<f64>,
     /// The direction that is up in the picture, world axes; need not be a unit vector.
@@ -35,6 +37,7 @@ impl MonitorScene {
             bodies: Vec::new(),
             screens: Vec::new(),
             head: None,
+            head_size: 1.0,
             reference_point: Point3::origin(),
             up: Vector3::z(),
             arrow_metres_per_newton: None,

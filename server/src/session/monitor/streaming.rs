@@ -183,6 +183,7 @@ fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
         .map(|screen| outline(screen, frame))
         .collect();
     scene.head = Some(frame.pose(&picture.head));
+    scene.head_size = frame.shrink;
     scene.reference_point = world.body.reference_point;
     scene.up = frame.scene_from_workbench.rotation * Vector3::z();
     scene
@@ -319,5 +320,30 @@ impl LoopTimes {
         sample.haptics_period = loop_time(0);
         sample.god_object_update = loop_time(1);
         sample.force_update = loop_time(2);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_head_is_shrunk_as_the_screens_are() {
+        let built = taut_scene::Scene::named_or_file("peg-in-a-hole").and_then(|s| s.build());
+        let picture = MonitorPicture {
+            name: "a magnified scene".to_owned(),
+            world: Arc::new(built.expect("a shipped scene").world),
+            moving: Vec::new(),
+            start: Pose::identity(),
+            screens: Vec::new(),
+            workbench_from_scene: Pose::translation(0.0, -0.45, 0.25),
+            display_scale: 5.0,
+            head: Pose::translation(0.0, -1.45, 0.25),
+            rest_distance: 1e-5,
+            colours: Vec::new(),
+        };
+        let scene = monitor_scene(&picture, &SceneFrame::of(&picture));
+        let away = scene.head.expect("a head").translation.vector.norm();
+        assert!((away - 0.2).abs() < 1e-12 && (scene.head_size - 0.2).abs() < 1e-12);
     }
 }
