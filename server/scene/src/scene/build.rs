@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use god_object::geometry::mass_properties;
 use god_object::spatial::{advance_pose, pose_difference};
-use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Primitive, Settings, Texture, World};
+use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Settings, Texture, World};
 use nalgebra::{Matrix3, Point3, Vector3};
 use taut_plant::HandPreset;
 use taut_proto::Panorama;
@@ -409,11 +409,7 @@ impl Scene {
 
     fn body(&self, mesh: Mesh) -> Result<Body, FileError> {
         let spec = &self.spec.god_object;
-        // A half-space cannot be held: a plane in the hand is its plate.
-        let primitive = spec
-            .shape
-            .primitive()
-            .filter(|p| !matches!(p, Primitive::Plane { .. }));
+        let primitive = spec.shape.primitive();
         let properties = primitive
             .and_then(|p| p.mass_properties())
             .unwrap_or_else(|| mass_properties(&mesh));

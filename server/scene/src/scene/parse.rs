@@ -11,7 +11,7 @@ use super::parse_shape::{pose, rotation_of, shape, surface};
 use super::settings_tables::{CouplingSpec, LimitSpec, MethodSpec};
 use super::spec::{
     BodySpec, EnvironmentSpec, HandPathSpec, MassSpec, MotionSpec, ObstacleSpec, ReferencePoint,
-    ScenerySpec, View,
+    ScenerySpec, Shape, View,
 };
 use crate::document::{Document, Range, Section, Value};
 use crate::fidelity::FidelitySpec;
@@ -110,7 +110,7 @@ fn god_object(section: Section<'_>) -> Option<BodySpec> {
         .get("shape")
         .map_or(section.at(), |node| &node.at)
         .clone();
-    let shape = shape(&section);
+    let shape = shape(&section).map(Shape::held);
     let mass = mass(&section);
     let pose = pose(&section);
     let reference_point = reference_point(&section);

@@ -6,7 +6,7 @@ use taut_plant::HandPreset;
 
 use crate::appearance::Appearance;
 use crate::document::At;
-use crate::shapes::{Axis, exact_capsule, exact_cylinder, exact_plane, exact_sphere};
+use crate::shapes::{Axis, PLATE, exact_capsule, exact_cylinder, exact_plane, exact_sphere};
 
 /// The form of a body.
 ///
@@ -70,7 +70,7 @@ pub enum Shape {
     },
     /// A plane through the origin: a half-space, or a big box of this thickness whose upper face holds the origin.
     Plane {
-        /// Length of either side and thickness, m; `None` has no end. In the hand it has: a half-space cannot be held.
+        /// Length of either side and thickness, m; `None` has no end, and is not in the hand.
         plate: Option<[f64; 2]>,
         /// The normal.
         axis: Axis,
@@ -83,6 +83,17 @@ impl Shape {
         match self {
             Self::Mesh { path, .. } => Some(path),
             _ => None,
+        }
+    }
+
+    /// The same in the hand, where a plane is its plate: a half-space cannot be held.
+    pub(super) fn held(self) -> Self {
+        match self {
+            Self::Plane { plate: None, axis } => Self::Plane {
+                plate: Some(PLATE),
+                axis,
+            },
+            other => other,
         }
     }
 

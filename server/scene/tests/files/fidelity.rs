@@ -42,6 +42,24 @@ fn a_curved_scene_is_updated_more_often_than_a_flat_one() {
 }
 
 #[test]
+fn a_plane_in_the_hand_counts_as_the_plate_that_it_is() {
+    let boxed = BALL.replace(
+        "sphere = { radius = 0.02 }",
+        "box = { half_extents = [0.02, 0.02, 0.02] }",
+    );
+    for (key, obstacle) in [("fidelity = \"auto\"\n", BALL), ("", boxed.as_str())] {
+        let held = |plane: &str| {
+            let body = BODY.replace("sphere = { radius = 0.02 }", plane);
+            let body = body.replace("0.05]", "0.5]");
+            let built = parse(&format!("{key}{body}{obstacle}")).and_then(|scene| scene.build());
+            let built = built.unwrap();
+            (built.settings, built.fidelity)
+        };
+        assert_eq!(held("plane = {}"), held("plane = { size = 1.0 }"));
+    }
+}
+
+#[test]
 fn the_choice_reaches_the_settings_and_keys_of_the_file_win() {
     let text = format!("fidelity = \"auto\"\n{BODY}{BALL}");
     let built = parse(&text).unwrap().build().unwrap();
