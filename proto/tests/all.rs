@@ -10,6 +10,7 @@ mod codec;
 mod confirmations;
 mod constraints;
 mod events;
+mod free_running;
 mod golden;
 mod group;
 mod key;

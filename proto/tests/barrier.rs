@@ -145,7 +145,7 @@ fn a_dead_node_is_left_after_ten_frames_and_out_after_half_a_second() {
     assert!((SILENCE_NS..SILENCE_NS + 2 * PERIOD).contains(&(last - died)));
 }
 
-fn state_of(master: &Master, session: u16) -> Option<NodeState> {
+pub fn state_of(master: &Master, session: u16) -> Option<NodeState> {
     let mut members = master.members();
     members.find(|m| m.session == session).map(|m| m.state)
 }
@@ -160,7 +160,7 @@ fn frame_of_wall(master: &mut Master, last: u64, second: Option<(u64, Arrive)>) 
     release_when_due(master)
 }
 
-fn made_for(period_us: u32, arrive: Arrive) -> Arrive {
+pub fn made_for(period_us: u32, arrive: Arrive) -> Arrive {
     Arrive {
         period_us,
         ..arrive

@@ -140,3 +140,26 @@ fn a_member_is_followed_only_while_the_server_is_silent() {
     );
     assert!(!successor.may_follow(silent, 2, &of_member(2, u64::MAX)));
 }
+
+#[test]
+fn a_node_that_was_stopped_blames_nobody_however_short_the_silence() {
+    for silence in [30 * MS, SUCCESSION_NS, 600 * MS] {
+        let head = ReleaseHead {
+            term: 1,
+            frame: 7,
+            members: [1, 2].into_iter().collect(),
+            ..ReleaseHead::default()
+        };
+        let mut node = Succession::new(1, 0).after_silence(silence);
+        node.release(0, &head);
+        node.look(silence / 10);
+        let mut now = 2 * silence;
+        node.look(now);
+        assert_eq!(node.poll(now), Successor::No);
+        for _ in 0..10 {
+            now += silence / 10;
+            node.look(now);
+        }
+        assert!(matches!(node.poll(now), Successor::Stand { .. }));
+    }
+}

@@ -11,7 +11,7 @@
 //! who was in step, and slow nodes find together.
 //!
 //! A node that is made for fewer frames than the least rate, and one that is not in step within [`PROBATION_FRAMES`] or misses [`MAX_MISSES`], runs free:
-//! it draws the newest state whenever it can, is not waited for, and sets nobody's pace, until it has drawn as many frames in a row as fast as it says.
+//! it draws the newest state whenever it can, is not waited for, and sets nobody's pace, until it was in time for as many frames in a row.
 
 use super::{
     Arrive, FARTHEST_AHEAD, FRAMES_LEFT_OUT, FrameSkew, LEAD_NS, MAX_MEMBERS, MOST_TERMS_AHEAD,
@@ -221,10 +221,10 @@ impl Master {
             let in_time = arrive.frame == open && now_ns <= self.opened_ns + self.patience_ns()
                 || arrive.frame + 1 == open && now_ns <= self.last_deadline_ns;
             self.compare(arrive);
-            let patience_ns = self.patience_for(&self.members[index]);
+            let fast_enough = own_ns(&self.members[index]) <= self.slowest_ns();
             let member = &mut self.members[index];
             let before = member.state;
-            member.arrive(now_ns, arrive, in_time, patience_ns);
+            member.arrive(arrive, in_time && fast_enough);
             if member.state != before {
                 let to = Some(member.state);
                 self.tell(session, to);
@@ -333,14 +333,6 @@ impl Master {
             true => self.period_ns(),
             false => self.slowest_ns(),
         })
-    }
-
-    /// What a frame of this node may take by what it says of itself; 0 where that is below the least rate.
-    fn patience_for(&self, member: &Member) -> u64 {
-        match own_ns(member) <= self.slowest_ns() {
-            true => patience_of(own_ns(member).max(self.settings.period_ns)),
-            false => 0,
-        }
     }
 
     /// Leaves a node to itself that says it is slower than the least rate.

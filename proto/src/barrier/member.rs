@@ -47,9 +47,7 @@ pub(super) struct Member {
     knows_time: bool,
     /// When it was heard last: session time, ns.
     pub(super) heard_ns: u64,
-    /// When it arrived at a frame last: session time, ns.
-    arrived_ns: u64,
-    /// Frames in a row at which it arrived in time; of one that runs free, frames that it drew as fast as it says.
+    /// Frames in a row at which it arrived in time.
     on_time: u32,
     /// Releases in a row without an arrival between them.
     misses: u32,
@@ -71,7 +69,6 @@ impl Member {
             period_us: 0,
             knows_time: false,
             heard_ns: now_ns,
-            arrived_ns: now_ns,
             on_time: 0,
             misses: 0,
             probation: 0,
@@ -79,15 +76,8 @@ impl Member {
         }
     }
 
-    /// Takes the arrival at a frame that it has not arrived at yet. `patience_ns`: what a frame may take at the rate that the node says it is made for;
-    /// 0 where that is below the least rate.
-    pub(super) fn arrive(&mut self, now_ns: u64, arrive: &Arrive, in_time: bool, patience_ns: u64) {
-        let took_ns = now_ns.saturating_sub(self.arrived_ns);
-        self.arrived_ns = now_ns;
-        let in_time = match self.state {
-            NodeState::FreeRunning => took_ns <= patience_ns,
-            _ => in_time,
-        };
+    /// Takes the arrival at a frame that it has not arrived at yet.
+    pub(super) fn arrive(&mut self, arrive: &Arrive, in_time: bool) {
         self.arrived = arrive.frame;
         self.missed = arrive.missed;
         self.draw_us = arrive.draw_us;

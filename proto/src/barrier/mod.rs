@@ -44,8 +44,8 @@ pub const REPEAT_NS: u64 = 200_000;
 pub const WARM_UP_FRAMES: u32 = 5;
 /// Frames that a late node arrives at in time before the others wait for it again: one that is now and then in time costs nothing.
 pub const RECOVERY_FRAMES: u32 = 3;
-/// Frames in a row within which a node that is new or was late comes to be waited for; who does not swaps on its own. As many in a row, each as soon
-/// as the node says it may, bring it back.
+/// Frames in a row within which a node that is new or was late comes to be waited for; who does not swaps on its own. As many in a
+/// row at which it is in time bring it back.
 pub const PROBATION_FRAMES: u32 = 30;
 /// Frames in a row at which a node did not arrive after which it swaps on its own.
 pub const MAX_MISSES: u32 = 10;

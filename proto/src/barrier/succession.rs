@@ -37,6 +37,7 @@ pub struct Succession {
     /// Silence after which the first stands.
     silence_ns: u64,
     heard_ns: u64,
+    looked_ns: u64,
     newest: Option<ReleaseHead>,
     leading: Option<u64>,
 }
@@ -48,6 +49,7 @@ impl Succession {
             session,
             silence_ns: SUCCESSION_NS,
             heard_ns: now_ns,
+            looked_ns: now_ns,
             newest: None,
             leading: None,
         }
@@ -84,6 +86,15 @@ impl Succession {
     /// Any authentic datagram of the present master came.
     pub fn hear(&mut self, now_ns: u64) {
         self.heard_ns = self.heard_ns.max(now_ns);
+    }
+
+    /// Looks at the clock, some times in each silence: from a late look on silence counts anew, because who was itself stopped has heard nobody, and
+    /// nobody is to blame.
+    pub fn look(&mut self, now_ns: u64) {
+        if now_ns.saturating_sub(self.looked_ns) > self.silence_ns / 3 * 2 {
+            self.hear(now_ns);
+        }
+        self.looked_ns = now_ns;
     }
 
     /// An authentic RELEASE came, from whomever.

@@ -34,6 +34,11 @@ impl SilenceLimits {
             dead_after_ns,
         }
     }
+
+    /// Distance between two looks from which on the watcher counts as having been stopped, ns: 150 ms of 500.
+    fn late_look_ns(self) -> u64 {
+        self.dead_after_ns / 10 * 3
+    }
 }
 
 /// What a silence means.
@@ -46,9 +51,6 @@ pub enum Liveness {
     /// Gone. Final: a peer that comes back does so as a new one.
     Dead,
 }
-
-/// Distance between two looks from which on the watcher counts as having been stopped, ns.
-const LATE_LOOK_NS: u64 = 150_000_000;
 
 /// Watches one peer.
 #[derive(Clone, Debug)]
@@ -71,9 +73,9 @@ impl PeerWatch {
         }
     }
 
-    /// What the silence since `heard_ns` means at `now_ns`. Look at least every 100 ms. Once dead it stays dead.
+    /// What the silence since `heard_ns` means at `now_ns`. Look four times or more in the silence that means gone. Once dead it stays dead.
     pub fn look(&mut self, now_ns: u64, heard_ns: u64) -> Liveness {
-        if now_ns.saturating_sub(self.last_look_ns) > LATE_LOOK_NS {
+        if now_ns.saturating_sub(self.last_look_ns) > self.limits.late_look_ns() {
             self.awake_since_ns = now_ns;
         }
         self.last_look_ns = now_ns.max(self.last_look_ns);
@@ -135,6 +137,18 @@ mod tests {
             watch.look(now * MS, 10 * MS);
         }
         assert_eq!(watch.look(5_500 * MS, 10 * MS), Liveness::Dead);
+    }
+
+    #[test]
+    fn a_watcher_that_was_stopped_blames_nobody_for_a_short_silence_either() {
+        let limits = SilenceLimits::OF_A_NODE.with_dead_after(100 * MS);
+        let mut watch = PeerWatch::new(limits, 0);
+        assert_eq!(watch.look(25 * MS, 20 * MS), Liveness::Alive);
+        assert_eq!(watch.look(145 * MS, 20 * MS), Liveness::Alive);
+        for now in [170, 195, 220] {
+            let _ = watch.look(now * MS, 20 * MS);
+        }
+        assert_eq!(watch.look(245 * MS, 20 * MS), Liveness::Dead);
     }
 
     #[test]

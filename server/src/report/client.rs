@@ -26,7 +26,7 @@ pub struct ClientReport {
     /// How much later the light of its pictures came than the first node's of the same frame; `null` where its window system does not tell.
     #[serde(default)]
     pub light_skew_us: Option<Distribution>,
-    /// It swapped on its own at the end: fewer frames than the least rate, or than it said.
+    /// It swapped on its own at the end, or when it left: fewer frames than the least rate, or than it said.
     #[serde(default)]
     pub free_running: bool,
     /// Datagrams that never arrived.

@@ -18,8 +18,6 @@ use taut_proto::{
 
 /// States whose fingerprints are remembered: a second at 1 kHz.
 const REMEMBERED_STATES: usize = 1024;
-/// Distance between two looks from which on this machine counts as having been stopped itself, ns: it has heard nobody, and nobody is to blame.
-const LATE_LOOK_NS: u64 = 100_000_000;
 
 pub(crate) struct Frames {
     inner: Mutex<Option<Part>>,
@@ -35,7 +33,6 @@ pub(crate) struct Part {
     /// Of the newest RELEASE, with its fingerprint.
     pub(crate) state: Option<(HotState, u64)>,
     succession: Succession,
-    looked_ns: u64,
     leading: Option<Master>,
     witnessed: Witnessed,
 }
@@ -79,7 +76,6 @@ impl Part {
             node: Node::new(session, period_us),
             state: None,
             succession: Succession::new(session, now_ns).after_silence(silence_ns),
-            looked_ns: now_ns,
             leading: None,
             witnessed: Witnessed {
                 hashes: Box::new([0; REMEMBERED_STATES]),
@@ -257,10 +253,7 @@ impl Frames {
         let Some(part) = &mut *inner else {
             return false;
         };
-        if local_ns.saturating_sub(part.looked_ns) > LATE_LOOK_NS {
-            part.succession.hear(local_ns);
-        }
-        part.looked_ns = local_ns;
+        part.succession.look(local_ns);
         if part.node.master() == SERVER_SENDER
             && let Some(heard_ns) = heard_ns
         {

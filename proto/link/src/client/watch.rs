@@ -24,7 +24,7 @@ pub enum LinkHealth {
     Rejoining,
 }
 
-/// Watches the server of one link. Look at least every 100 ms.
+/// Watches the server of one link. Look four times or more in the silence after which it is gone.
 #[derive(Debug)]
 pub struct LinkWatch {
     limits: SilenceLimits,

@@ -28,7 +28,7 @@ pub struct FrameReport {
     pub nodes: Vec<(String, Distribution)>,
     /// Each node that knows it by name: its light less the first of the same frame, µs.
     pub lit_nodes: Vec<(String, Distribution)>,
-    /// Nodes that swap on their own now, by name.
+    /// Nodes that swap on their own now, or did when they left, by name.
     pub free_running: Vec<String>,
 }
 
@@ -38,7 +38,7 @@ pub(crate) struct Recorder {
     lights: Apart,
     overhead: Histogram<u64>,
     age: Histogram<u64>,
-    /// As many as there are members, at most.
+    /// [`MAX_NODES`] at most; then the oldest goes.
     free_running: Vec<String>,
 }
 
@@ -123,6 +123,9 @@ impl Recorder {
         let known = self.free_running.iter().position(|free| free == node);
         match (state, known) {
             (Some(NodeState::FreeRunning), None) => {
+                if self.free_running.len() == MAX_NODES {
+                    self.free_running.remove(0);
+                }
                 self.free_running.push(node.to_owned());
                 Some(true)
             }
@@ -131,7 +134,8 @@ impl Recorder {
                 self.free_running.remove(index);
                 Some(false)
             }
-            (None, Some(index)) => {
+            // It was away, and begins anew.
+            (Some(NodeState::Joining), Some(index)) => {
                 self.free_running.remove(index);
                 None
             }
@@ -157,4 +161,25 @@ impl Recorder {
 fn histogram() -> Histogram<u64> {
     // Two significant figures over a fixed range: constants that hdrhistogram takes.
     Histogram::new_with_bounds(1, LONGEST_NS, 2).unwrap_or_else(|_| unreachable!("constant bounds"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_node_that_comes_again_runs_free_no_more_and_is_news_when_it_does() {
+        let mut recorder = Recorder::default();
+        let free = |recorder: &Recorder| recorder.report(Counts::default()).free_running;
+        let runs_free = Some(NodeState::FreeRunning);
+        assert_eq!(recorder.note("wall", runs_free), Some(true));
+        assert_eq!(recorder.note("wall", runs_free), None);
+        assert_eq!(recorder.note("wall", None), None);
+        assert_eq!(free(&recorder), ["wall"], "it did when it left");
+        assert_eq!(recorder.note("wall", Some(NodeState::Joining)), None);
+        assert!(free(&recorder).is_empty());
+        assert_eq!(recorder.note("wall", runs_free), Some(true));
+        assert_eq!(recorder.note("wall", Some(NodeState::Synced)), Some(false));
+        assert!(free(&recorder).is_empty());
+    }
 }
