@@ -68,6 +68,13 @@ pub struct SessionSetup {
     pub fidelity: Option<FidelityPlan>,
 }
 
+impl SessionSetup {
+    /// Places in the world of the obstacles that move.
+    pub fn moving(&self) -> impl Iterator<Item = usize> {
+        self.motions.iter().map(|motion| motion.obstacle)
+    }
+}
+
 /// Where a session is recorded, so that it can be computed again.
 #[derive(Clone, Debug)]
 pub struct RecordingSettings {
