@@ -223,7 +223,7 @@ impl DevicePort {
         if let Some(command) = &command {
             let commanded = command.wrench + command.external;
             self.controller
-                .grant(command.obstacle_work, &commanded, self.slew.rendered());
+                .grant(command.obstacle_work, &commanded, self.energy.held());
         }
         let wrench = self.render(now, passed, command);
         self.device
