@@ -251,7 +251,7 @@ fn network_runtime(ledger: &RealtimeLedger) -> Result<Runtime, Failure> {
 fn coupling_offer(setup: &SessionSetup) -> Result<CouplingOffer, Failure> {
     match &setup.device {
         DeviceSource::Remote { .. } => {
-            let sets_hz = setup.realtime.broadcast_period.as_secs_f64().recip();
+            let sets_hz = setup.realtime.bridge_period().as_secs_f64().recip();
             offer_of(&setup.world, &setup.settings, setup.moving(), sets_hz).map_err(unencodable)
         }
         DeviceSource::Local(_) => Ok(CouplingOffer::AtServer {

@@ -166,3 +166,10 @@ pub struct RealtimeSettings {
     /// Keep all memory in RAM.
     pub lock_memory: bool,
 }
+
+impl RealtimeSettings {
+    /// Time between two forces or constraint sets to a bridge: a hand waits for no picture.
+    pub fn bridge_period(&self) -> Duration {
+        self.broadcast_period.min(self.haptics_period)
+    }
+}
