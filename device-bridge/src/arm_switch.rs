@@ -5,7 +5,7 @@
 
 use std::io::{BufRead, IsTerminal};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 
 /// What an operator wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,53 +16,47 @@ pub enum ArmWish {
     Disarm,
 }
 
-const NOTHING: u8 = 0;
+/// A wish for force waits.
 const ARM: u8 = 1;
+/// A wish for no force waits.
 const DISARM: u8 = 2;
+/// The last wish was for no force.
+const OFF: u8 = 4;
 
-/// Carries the newest wish. Wait-free; share it by `Arc`.
+/// Carries the newest wish. Lock-free; share it by `Arc`.
 #[derive(Debug, Default)]
 pub struct ArmSwitch {
+    /// What waits, and what was wished last: of several who wish at once both are one's.
     wish: AtomicU8,
-    /// The last wish was for no force.
-    off: AtomicBool,
 }
 
 impl ArmSwitch {
     /// Makes a wish. A wish for no force that was not yet taken is not undone by one for force.
     pub fn wish(&self, wish: ArmWish) {
         match wish {
-            ArmWish::Arm => {
-                // Fails where another wish waits: that one stands.
-                let made =
-                    self.wish
-                        .compare_exchange(NOTHING, ARM, Ordering::Relaxed, Ordering::Relaxed);
-                if made.is_ok() {
-                    self.off.store(false, Ordering::Relaxed);
-                }
-            }
-            ArmWish::Disarm => {
-                self.off.store(true, Ordering::Relaxed);
-                self.wish.store(DISARM, Ordering::Relaxed);
-            }
+            ArmWish::Arm => self.change(|known| if known & DISARM == 0 { ARM } else { known }),
+            ArmWish::Disarm => self.change(|_| DISARM | OFF),
         }
     }
 
     /// For the next session of the same process: a wish for force of before does not count, and where the last one was for no force it stands.
     pub fn begin_again(&self) {
-        let _ = self.take();
-        if self.off.load(Ordering::Relaxed) {
-            self.wish(ArmWish::Disarm);
-        }
+        self.change(|known| if known & OFF == 0 { 0 } else { DISARM | OFF });
     }
 
     /// Takes the wish, if there is one.
     pub fn take(&self) -> Option<ArmWish> {
-        match self.wish.swap(NOTHING, Ordering::Relaxed) {
+        match self.wish.fetch_and(OFF, Ordering::Relaxed) & !OFF {
             ARM => Some(ArmWish::Arm),
             DISARM => Some(ArmWish::Disarm),
             _ => None,
         }
+    }
+
+    /// In one step, whoever else wishes.
+    fn change(&self, to: impl Fn(u8) -> u8) {
+        let [set, seen] = [Ordering::Relaxed; 2];
+        let _ = self.wish.fetch_update(set, seen, |known| Some(to(known))); // there is always one
     }
 }
 
@@ -133,6 +127,22 @@ mod tests {
         assert_eq!(switch.take(), Some(ArmWish::Arm));
         switch.begin_again();
         assert_eq!(switch.take(), None);
+    }
+
+    #[test]
+    fn of_several_who_wish_at_once_the_one_for_no_force_lasts() {
+        for _ in 0..2000 {
+            let switch = ArmSwitch::default();
+            std::thread::scope(|scope| {
+                for wish in [ArmWish::Arm, ArmWish::Disarm, ArmWish::Arm] {
+                    let switch = &switch;
+                    scope.spawn(move || switch.wish(wish));
+                }
+            });
+            assert_eq!(switch.take(), Some(ArmWish::Disarm));
+            switch.begin_again();
+            assert_eq!(switch.take(), Some(ArmWish::Disarm), "in the next session");
+        }
     }
 
     #[test]

@@ -40,6 +40,11 @@ pub trait Device: Send {
     /// obstacles on the hand so far, J. For a device at the far end of a network, which counts the age of a force and its energy from there.
     fn comes_from(&mut self, _origin: Option<Duration>, _obstacle_work: f64) {}
 
+    /// Metres of the scene that a metre of the device's motion is: speeds and damping of a hand are those at the device.
+    fn scale(&self) -> f64 {
+        1.0
+    }
+
     /// What the hand feels as far as the device knows, where that may differ from what [`Device::write`] was given: what a device at
     /// the far end of a network told with its last reading, or what the motors here can render of the last write. `None` where
     /// there is nothing to tell.

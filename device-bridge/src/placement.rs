@@ -45,6 +45,12 @@ impl Placement {
         }
     }
 
+    /// Metres of the world that a metre on the workbench is.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.workbench_from_world.scaling().recip()
+    }
+
     /// A displacement or a velocity seen on the workbench, as it is in the world.
     #[must_use]
     pub fn vector_in_world(&self, in_workbench: &Vector3<f64>) -> Vector3<f64> {

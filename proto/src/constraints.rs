@@ -96,7 +96,7 @@ pub struct ConstraintRow {
     pub normal: [f32; 3],
     /// Distance of the features, m.
     pub gap: f32,
-    /// How far the obstacle's point at the contact went in one update, m, scene axes.
+    /// How far the obstacle's point at the contact went since the set that was sent before, m, scene axes.
     pub obstacle_displacement: [f32; 3],
     /// How the distance changes when the body turns; the default where nobody re-linearises.
     pub separation: RowSeparation,

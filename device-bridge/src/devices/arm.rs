@@ -144,12 +144,8 @@ impl ArmDevice {
         if self.anchor == Anchor::Workbench {
             let pose = self.placement.pose_in_world(cursor);
             // Without a grip nothing turns the body.
-            let rotation = if has_grip {
-                pose.rotation
-            } else {
-                self.placement.start.rotation
-            };
-            return Isometry3::from_parts(pose.translation, rotation);
+            let turned = if has_grip { pose } else { self.placement.start };
+            return Isometry3::from_parts(pose.translation, turned.rotation);
         }
         let start = self.placement.at_reference_point(&self.placement.start);
         let (cursor_then, body_then) = *self.anchored.get_or_insert((*cursor, start));
@@ -251,6 +247,10 @@ impl Device for ArmDevice {
         }
         self.port
             .push(self.in_arm(wrench.fixed_rows::<3>(0).into()).into());
+    }
+
+    fn scale(&self) -> f64 {
+        self.mapping.scale * self.placement.scale()
     }
 
     fn let_go(&mut self) -> bool {

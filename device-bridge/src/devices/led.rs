@@ -66,7 +66,7 @@ impl LedDevice {
         let target = self.placement.at_reference_point(target);
         let missing = target.translation.vector - self.pose.translation.vector;
         let turn = (target.rotation * self.pose.rotation.inverse()).scaled_axis();
-        let slower = self.placement.workbench_from_world.scaling().recip();
+        let slower = self.placement.scale();
         (
             (missing / LAG_S).cap_magnitude(SPEED * slower),
             (turn / LAG_S).cap_magnitude(TURN_RATE),
@@ -77,6 +77,10 @@ impl LedDevice {
 impl Device for LedDevice {
     fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    fn scale(&self) -> f64 {
+        self.placement.scale()
     }
 
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {

@@ -112,6 +112,12 @@ impl RateControl {
         }
     }
 
+    /// Metres of the world that a metre on the workbench is.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.placement.scale()
+    }
+
     /// Pose of the body's own frame, and velocity of G then angular velocity, world axes.
     #[must_use]
     pub fn state(&self) -> (Pose, Vector6<f64>) {
@@ -138,7 +144,7 @@ impl RateControl {
         let (mut linear, mut angular) = self.commanded();
         if wrench.iter().all(|x| x.is_finite()) {
             // The gains hold on the workbench: a world that is drawn larger moves more slowly.
-            let slower = self.placement.workbench_from_world.scaling().recip();
+            let slower = self.scale();
             linear += wrench.fixed_rows::<3>(0) * (speed * slower / yield_force);
             angular += wrench.fixed_rows::<3>(3) * (turn_rate / yield_torque);
         }

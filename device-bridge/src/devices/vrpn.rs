@@ -149,6 +149,10 @@ impl Device for VrpnDevice {
         &self.info
     }
 
+    fn scale(&self) -> f64 {
+        self.placement.scale()
+    }
+
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
         let newest = self.reader.newest();
         let is_new = newest.reports != self.reports;

@@ -32,13 +32,14 @@ pub enum OfferError {
     },
 }
 
-/// What a server with this world offers its bridge, `set_rate_hz` sets a second; the reason where it keeps the coupling.
+/// What a server with this world, whose obstacles `moving` move, offers its bridge, `set_rate_hz` sets a second; the reason where it keeps the coupling.
 ///
 /// # Errors
 /// A number of the scene that no program takes from another, by its name.
 pub fn offer_of(
     world: &World,
     settings: &Settings,
+    moving: impl IntoIterator<Item = usize>,
     set_rate_hz: f64,
 ) -> Result<CouplingOffer, EncodeError> {
     let at_server = |reason: String| {
@@ -54,6 +55,11 @@ pub fn offer_of(
     let Some(obstacles) = obstacles.iter().map(wire_surface).collect() else {
         return at_server("a surface has a height map, which does not travel".to_owned());
     };
+    // Rows say what obstacles did, not where they are, and a texture goes with its obstacle.
+    let is_textured = |place: usize| world.obstacles[place].surface.texture.is_some();
+    if moving.into_iter().any(is_textured) {
+        return at_server("an obstacle with a texture moves, and that does not travel".to_owned());
+    }
     // Shapes stay here: the coupling asks for the radius alone.
     let Body {
         mesh,
@@ -255,7 +261,7 @@ mod tests {
     }
 
     fn offered(world: &World, settings: &Settings) -> EdgeCoupling {
-        match offer_of(world, settings, 1000.0) {
+        match offer_of(world, settings, [], 1000.0) {
             Ok(CouplingOffer::AtEdge(offer)) => offer,
             other => panic!("{other:?}"),
         }
@@ -284,14 +290,14 @@ mod tests {
             ..settings
         };
         assert!(matches!(
-            offer_of(&world, &many, 1000.0),
+            offer_of(&world, &many, [], 1000.0),
             Ok(CouplingOffer::AtServer { .. })
         ));
         let stiff = Settings {
             k_h: 1e13,
             ..settings
         };
-        let refused = offer_of(&world, &stiff, 1000.0).expect_err("nobody would take it");
+        let refused = offer_of(&world, &stiff, [], 1000.0).expect_err("nobody would take it");
         assert!(
             refused
                 .to_string()
@@ -306,9 +312,19 @@ mod tests {
             })
         });
         assert!(matches!(
-            offer_of(&world, &settings, 1000.0),
+            offer_of(&world, &settings, [], 1000.0),
             Ok(CouplingOffer::AtServer { .. })
         ));
+    }
+
+    #[test]
+    fn a_texture_that_moves_stays_at_the_server_and_one_that_stands_does_not() {
+        let (world, settings) = scene();
+        for (moving, stays) in [(vec![], false), (vec![0], false), (vec![0, 1], true)] {
+            let offer = offer_of(&world, &settings, moving, 1000.0);
+            let at_server = matches!(offer, Ok(CouplingOffer::AtServer { .. }));
+            assert_eq!(at_server, stays, "{offer:?}");
+        }
     }
 
     #[test]

@@ -101,7 +101,7 @@ impl DevicePort {
         start: &Pose,
     ) -> Self {
         let info = device.info();
-        let mut settings = settings.within(&info.limits).that_can_fade();
+        let mut settings = settings.for_device(device.as_ref());
         if info.actuated_degrees_of_freedom == 3 {
             settings.max_torque = 0.0; // it has no motors for one
         }
@@ -223,7 +223,7 @@ impl DevicePort {
         if let Some(command) = &command {
             let commanded = command.wrench + command.external;
             self.controller
-                .grant(command.obstacle_work, &commanded, self.slew.rendered());
+                .grant(command.obstacle_work, &commanded, self.energy.held());
         }
         let wrench = self.render(now, passed, command);
         self.device

@@ -80,6 +80,11 @@ impl EnergyObserver {
         self.held = *wrench;
     }
 
+    /// What does the work: the wrench on the hand since the last write.
+    pub(crate) fn held(&self) -> &Vector6<f64> {
+        &self.held
+    }
+
     /// A sample that may not be trusted: the measurement starts afresh with the next one.
     pub(crate) fn skip(&mut self) {
         self.last = None;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::passivity::PassivitySettings;
 use super::validation::ValidationSettings;
-use crate::device::DeviceLimits;
+use crate::device::{Device, DeviceLimits};
 
 /// Limits and times of a [`DevicePort`](super::DevicePort).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,6 +110,17 @@ impl SafetySettings {
         self
     }
 
+    /// The same for a port of this device: within its limits, that can fade, and with what is said of the hand's speed, which is one at the device, in the
+    /// scene's metres, in which the port sees it.
+    pub(super) fn for_device(self, device: &dyn Device) -> Self {
+        let mut settings = self.within(&device.info().limits).that_can_fade();
+        let scale = device.scale();
+        settings.validation.max_speed *= scale;
+        settings.validation.frozen_speed *= scale;
+        settings.passivity.max_damping /= scale;
+        settings
+    }
+
     /// The same with a ramp-out that its period leaves time for, and with limits from which the force can come down in it without breaking the slew
     /// limit: only so can both promises be kept at once.
     pub(crate) fn that_can_fade(mut self) -> Self {
@@ -161,6 +172,86 @@ impl Default for SafetySettings {
             arm_button: None,
             validation: ValidationSettings::default(),
             passivity: PassivitySettings::default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, Vector6};
+
+    use super::*;
+    use crate::device::{DeviceFault, DeviceInfo, DeviceSample, Pose};
+    use crate::port::{Command, DevicePort, Passivity};
+
+    /// A hand of `speed` m/s along x, at a device whose metre is `scale` of the scene.
+    struct Scaled {
+        info: DeviceInfo,
+        scale: f64,
+        speed: f64,
+    }
+
+    impl Device for Scaled {
+        fn info(&self) -> &DeviceInfo {
+            &self.info
+        }
+
+        fn scale(&self) -> f64 {
+            self.scale
+        }
+
+        fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+            let speed = self.speed * self.scale;
+            Ok(DeviceSample {
+                time: now,
+                pose: Pose::translation(speed * now.as_secs_f64(), 0.0, 0.0),
+                velocity: Vector6::x() * speed,
+                buttons: 0,
+            })
+        }
+
+        fn write(&mut self, _now: Duration, _wrench: &Vector6<f64>) {}
+    }
+
+    /// Whether the samples are believed, and the force along x, N, that is felt where 10 N give energy without end.
+    fn felt(scale: f64, speed: f64) -> (bool, f64) {
+        let device = Scaled {
+            info: DeviceInfo {
+                name: "scaled".to_owned(),
+                sensed_degrees_of_freedom: 3,
+                actuated_degrees_of_freedom: 3,
+                limits: DeviceLimits::UNLIMITED,
+                rate_hz: 1000.0,
+            },
+            scale,
+            speed,
+        };
+        let settings = SafetySettings {
+            passivity: PassivitySettings {
+                mode: Passivity::Control,
+                max_debt: 10.0, // nothing but the damping takes any
+                ..PassivitySettings::default()
+            },
+            ..SafetySettings::default()
+        };
+        let start = Pose::identity();
+        let mut port = DevicePort::new(Box::new(device), settings, Point3::origin(), &start);
+        for tick in 1..=1000 {
+            let now = Duration::from_millis(tick);
+            let command = Command::fresh(now, Vector6::x() * 10.0);
+            let _ = port.tick(now, |_| Some(command));
+        }
+        (port.fault().is_none(), port.rendered().x)
+    }
+
+    #[test]
+    fn the_speed_of_a_hand_is_that_at_the_device_however_it_is_scaled() {
+        for scale in [0.1, 1.0, 10.0] {
+            // 20 N s/m at 0.2 m/s.
+            let (believed, force) = felt(scale, 0.2);
+            assert!(believed && (force - 6.0).abs() < 1e-6, "{force} at {scale}");
+            assert!(felt(scale, 2.9).0, "{scale}");
+            assert!(!felt(scale, 3.1).0, "{scale}");
         }
     }
 }

@@ -9,24 +9,21 @@ use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, Vector6, angular, at_reference_point, linear, pose_difference};
 use god_object::{ConstraintSet, NonPenetrationConstraint};
 use taut_bridge::ArmingState;
-use taut_bridge::edge::pass_on;
 use taut_link::Broadcaster;
 use taut_proto::state::{
     BodyState, ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS,
     RunState, TOOL_DEVICE_SILENT, TOOL_FORCE_LIMITED, ToolState, event_code,
 };
-use taut_proto::wrench::WRENCH_PAUSED;
-use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
+use taut_proto::{HotState, PoseF32};
 
 use crate::loops::shell::{Beat, run_at_deadlines};
 use crate::loops::wiring::SharedView;
-use crate::session::edge_sets::EdgeSets;
+pub use crate::session::bridge_commands::BridgeCommands;
 use crate::session::head::Head;
 use crate::session::observers::Outlets;
 use crate::shared::clock::{SessionClock, nanoseconds};
 use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
 use crate::shared::device_state::{DeviceState, RECENT_EVENTS};
-use crate::shared::passed_wrench::PassedReader;
 use crate::shared::shutdown::Shutdown;
 use crate::shared::wrench_command::WrenchCommand;
 
@@ -38,40 +35,6 @@ const BUTTON_SHIFT: u32 = 16;
 const MAX_WAITING: usize = 64;
 /// Most events that one sample brings: contact, fault, every button, everything that the port keeps.
 const MAX_AT_ONCE: usize = 2 + BUTTONS as usize + RECENT_EVENTS;
-
-/// Ticks in which a bridge is told that there is no force from outside any more.
-const TOLD_NONE: u32 = 100;
-
-/// What goes to the bridge of a remote device: wrenches, newest wins, or constraint sets.
-#[derive(Debug)]
-pub struct BridgeCommands {
-    /// From the haptics loop.
-    pub wrenches: triple_buffer::Output<WireWrench>,
-    /// For a bridge that couples by itself.
-    pub sets: EdgeSets,
-    /// A force from outside, where the workbench takes one.
-    pub passed: Option<PassedReader>,
-    /// Ticks in which there was none since the last, as far as they count.
-    pub told_none: u32,
-}
-
-impl BridgeCommands {
-    /// Sends the force from outside that is due; none while the port gives no force. That there is none any more is said some times over: a datagram may be lost.
-    fn pass_force(&mut self, armed: bool, broadcaster: &mut Broadcaster) {
-        let Some(passed) = &mut self.passed else {
-            return;
-        };
-        let judged = passed.read().as_ref().filter(|_| armed);
-        self.told_none = match judged {
-            Some(_) => 0,
-            None => self.told_none + 1,
-        };
-        if self.told_none <= TOLD_NONE {
-            broadcaster.send_force(&pass_on(judged));
-        }
-        self.told_none = self.told_none.min(TOLD_NONE);
-    }
-}
 
 /// Sends states, and the wrenches of a remote device, until the end is asked for.
 pub fn run(
@@ -106,15 +69,7 @@ pub fn run(
         }
     });
     if let Some(commands) = &mut bridge_commands {
-        commands.pass_force(false, &mut broadcaster);
-        commands.sets.pause(&mut broadcaster);
-        broadcaster.send_wrench(&WireWrench {
-            time_ns: nanoseconds(clock.now()),
-            origin_ns: 0,
-            wrench: [0.0; 6],
-            obstacle_work: 0.0,
-            flags: WRENCH_PAUSED,
-        });
+        commands.end(clock.now(), &mut broadcaster);
     }
 }
 
@@ -129,6 +84,9 @@ pub struct StateWriter {
     motion: MotionEstimate,
     events: EventSource,
     most_contacts: usize,
+    /// Time between two states, and from when on the next one is due.
+    period: Duration,
+    due: Duration,
 }
 
 impl StateWriter {
@@ -148,7 +106,15 @@ impl StateWriter {
             motion: MotionEstimate::default(),
             events: EventSource::default(),
             most_contacts: MAX_CONTACTS,
+            period: Duration::ZERO,
+            due: Duration::ZERO,
         }
+    }
+
+    /// The same with no more than a state in `period`, however often it is asked: for a loop that has more to send than states.
+    #[must_use]
+    pub fn with_period(self, period: Duration) -> Self {
+        Self { period, ..self }
     }
 
     /// The same with no more than so many contacts in a state, the nearest.
@@ -170,11 +136,12 @@ impl StateWriter {
         self.shared.contacts.newest()
     }
 
-    /// The state now; `None` while the device has not been sampled since the last one.
+    /// The state now; `None` while the device has not been sampled since the last one, or none is due.
     pub fn newest(&mut self, now: Duration) -> Option<&HotState> {
-        if !self.shared.device.refresh() {
+        if !self.shared.device.refresh() || now < self.due {
             return None;
         }
+        self.due = (self.due + self.period).max(now);
         let device = self.shared.device.held();
         let contacts = self.shared.contacts.newest();
         let wrench = self.shared.wrench.newest();
@@ -391,7 +358,9 @@ impl EventSource {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::head::{HeadMotion, HeadSource};
     use crate::shared::device_state::SafetyState;
+    use crate::shared::fanout::Publisher;
     use crate::shared::{contact_snapshot, device_state, wrench_command};
     use god_object::constraint::{Feature, FeaturePair};
     use taut_bridge::{EventKind, SafetyEvent};
@@ -427,16 +396,22 @@ mod tests {
         safety
     }
 
-    #[test]
-    fn a_state_carries_the_newest_of_everything_and_comes_once_per_sample() {
-        let start = Pose::translation(0.0, 0.0, 0.1);
-        let (mut states, state_readers) = device_state::channel(&start);
-        let (mut contacts, contact_readers) = contact_snapshot::channel(&start, 32);
-        let (mut wrenches, wrench_readers) = wrench_command::channel();
-        let source = crate::session::head::HeadSource {
+    /// A writer of states, and whose data it reads.
+    fn wired(
+        start: &Pose,
+    ) -> (
+        Publisher<DeviceState>,
+        Publisher<ContactSnapshot>,
+        Publisher<WrenchCommand>,
+        StateWriter,
+    ) {
+        let (states, state_readers) = device_state::channel(start);
+        let (contacts, contact_readers) = contact_snapshot::channel(start, 32);
+        let (wrenches, wrench_readers) = wrench_command::channel();
+        let source = HeadSource {
             rest: Pose::translation(0.0, -1.0, 1.0),
             eye_separation: 0.064,
-            motion: crate::session::head::HeadMotion::Still,
+            motion: HeadMotion::Still,
         };
         let [head] = source.start(None).expect("nothing to start");
         let shared = SharedView {
@@ -444,7 +419,31 @@ mod tests {
             contacts: contact_readers.broadcast,
             wrench: wrench_readers.broadcast,
         };
-        let mut writer = StateWriter::new(shared, head, &Point3::origin(), 7);
+        let writer = StateWriter::new(shared, head, &Point3::origin(), 7);
+        (states, contacts, wrenches, writer)
+    }
+
+    #[test]
+    fn states_are_as_rare_as_wanted_and_an_end_of_the_force_is_known_at_once() {
+        let start = Pose::identity();
+        let (mut states, _contacts, _wrenches, writer) = wired(&start);
+        let mut writer = writer.with_period(Duration::from_secs(1) / 50);
+        let mut device = DeviceState::at_start(&start);
+        let mut count = 0;
+        for tick in 1..=1000_u64 {
+            device.sequence = tick;
+            device.safety.gives = tick.is_multiple_of(2);
+            states.publish(&device);
+            count += u32::from(writer.newest(Duration::from_millis(tick)).is_some());
+            assert_eq!(writer.is_armed(), device.safety.gives);
+        }
+        assert!((50..=51).contains(&count), "{count} states in a second");
+    }
+
+    #[test]
+    fn a_state_carries_the_newest_of_everything_and_comes_once_per_sample() {
+        let start = Pose::translation(0.0, 0.0, 0.1);
+        let (mut states, mut contacts, mut wrenches, mut writer) = wired(&start);
         assert!(writer.newest(Duration::ZERO).is_none(), "no sample yet");
 
         let device = DeviceState {

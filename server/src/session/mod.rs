@@ -6,6 +6,7 @@
 
 pub(crate) mod admission;
 pub mod audit;
+pub mod bridge_commands;
 pub mod broadcast;
 mod clients;
 pub mod edge_sets;

@@ -251,8 +251,8 @@ fn network_runtime(ledger: &RealtimeLedger) -> Result<Runtime, Failure> {
 fn coupling_offer(setup: &SessionSetup) -> Result<CouplingOffer, Failure> {
     match &setup.device {
         DeviceSource::Remote { .. } => {
-            let sets_hz = setup.realtime.broadcast_period.as_secs_f64().recip();
-            offer_of(&setup.world, &setup.settings, sets_hz).map_err(unencodable)
+            let sets_hz = setup.realtime.bridge_period().as_secs_f64().recip();
+            offer_of(&setup.world, &setup.settings, setup.moving(), sets_hz).map_err(unencodable)
         }
         DeviceSource::Local(_) => Ok(CouplingOffer::AtServer {
             reason: "its workbench has a device of its own".into(),
@@ -340,7 +340,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
     MonitorPicture {
         name: description.name.to_string(),
         world: setup.world.clone(),
-        moving: setup.motions.iter().map(|motion| motion.obstacle).collect(),
+        moving: setup.moving().collect(),
         start: setup.start,
         screens: description.screens.clone(),
         workbench_from_scene: description

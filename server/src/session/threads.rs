@@ -92,17 +92,21 @@ impl Session {
 
     pub(super) fn start_broadcast(
         &mut self,
-        states: StateWriter,
+        mut states: StateWriter,
         broadcaster: Broadcaster,
         bridge_commands: Option<BridgeCommands>,
         outlets: Outlets,
         realtime: &RealtimeSettings,
     ) -> Result<(), Failure> {
         let (clock, shutdown) = (self.clock, self.shutdown.clone());
-        let beat = Beat {
+        let mut beat = Beat {
             period: realtime.broadcast_period,
             phase: realtime.phases.broadcast,
         };
+        if bridge_commands.is_some() && beat.period > realtime.bridge_period() {
+            states = states.with_period(beat.period);
+            beat.period = realtime.bridge_period();
+        }
         self.start_thread(
             "broadcast",
             Scheduling::Fifo(realtime.broadcast_priority),

@@ -105,6 +105,10 @@ impl Device for SpaceMouse {
         &self.info
     }
 
+    fn scale(&self) -> f64 {
+        self.body.scale()
+    }
+
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
         let newest = *self.newest.read();
         if newest.motions != self.seen.0 {

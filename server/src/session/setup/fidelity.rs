@@ -9,7 +9,7 @@ use crate::session::setup::RealtimeSettings;
 
 /// Puts the chosen rates into a session's, where the workbench leaves them open; the plan says what was used in the end.
 ///
-/// `at_bridge`: the device is behind a bridge, whose forces travel with the states; their rates stay.
+/// `at_bridge`: the device is behind a bridge; the rates stay as the workbench has them.
 pub(super) fn apply(
     plan: &mut FidelityPlan,
     realtime: &mut RealtimeSettings,

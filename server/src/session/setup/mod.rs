@@ -68,6 +68,13 @@ pub struct SessionSetup {
     pub fidelity: Option<FidelityPlan>,
 }
 
+impl SessionSetup {
+    /// Places in the world of the obstacles that move.
+    pub fn moving(&self) -> impl Iterator<Item = usize> {
+        self.motions.iter().map(|motion| motion.obstacle)
+    }
+}
+
 /// Where a session is recorded, so that it can be computed again.
 #[derive(Clone, Debug)]
 pub struct RecordingSettings {
@@ -158,4 +165,11 @@ pub struct RealtimeSettings {
     pub god_object_core: Option<usize>,
     /// Keep all memory in RAM.
     pub lock_memory: bool,
+}
+
+impl RealtimeSettings {
+    /// Time between two forces or constraint sets to a bridge: a hand waits for no picture.
+    pub fn bridge_period(&self) -> Duration {
+        self.broadcast_period.min(self.haptics_period)
+    }
 }

@@ -125,7 +125,8 @@ pub(super) fn where_coupled(
     workbench: &Workbench,
     overrides: &Overrides,
 ) -> Result<Option<String>, Failure> {
-    let offer = offer_of(&built.world, &built.settings, SETS_HZ).map_err(unencodable)?;
+    let moving = built.motions.iter().map(|motion| motion.obstacle);
+    let offer = offer_of(&built.world, &built.settings, moving, SETS_HZ).map_err(unencodable)?;
     let is_remote = overrides.input.is_none() && workbench.device == Device::Remote;
     Ok(match offer {
         CouplingOffer::AtServer { reason } if is_remote => Some(format!(
