@@ -439,7 +439,7 @@ impl Bridge {
         let mut of = BridgeLoop::new(port);
         let edge = match mode {
             Mode::Shipped => None,
-            Mode::Edge => match offer_of(&scene.world, &scene.settings, 1000.0) {
+            Mode::Edge => match offer_of(&scene.world, &scene.settings, [], 1000.0) {
                 Ok(CouplingOffer::AtEdge(offer)) => EdgeCoupler::new(&offer).ok(),
                 other => panic!("{other:?}"),
             },

@@ -203,7 +203,7 @@ struct Bridge {
 impl Bridge {
     fn new(task: &Task, mode: Mode) -> Self {
         let scene = &task.scene;
-        let offer = match offer_of(&scene.world, &scene.settings, SET_RATE_HZ) {
+        let offer = match offer_of(&scene.world, &scene.settings, [], SET_RATE_HZ) {
             Ok(CouplingOffer::AtEdge(offer)) => offer,
             other => panic!("{other:?}"),
         };

@@ -120,7 +120,7 @@ fn settings_at_the_edge(_: &Extent) -> Result<Finding, BenchError> {
     let (mut same, mut felt) = (0, 0);
     for _ in 0..DRAWS {
         let settings = drawn(&mut random);
-        let offer = offer_of(&resting.world, &settings, 1000.0).map_err(missing)?;
+        let offer = offer_of(&resting.world, &settings, [], 1000.0).map_err(missing)?;
         let offer = ControlMessage::Coupling(offer);
         let frame = offer.to_frame().map_err(missing)?;
         let came = ControlMessage::from_frame_body(&frame[LENGTH_BYTES..]).map_err(missing)?;
