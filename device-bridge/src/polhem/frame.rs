@@ -155,7 +155,7 @@ impl Frame {
     }
 }
 
-/// The line that commands a force, N; zero where it is not finite. A board that speaks in lines of 63 bytes takes [`short_force_frame`].
+/// The line that commands a force, N; zero where it is not finite. A board that speaks in lines of 63 bytes takes the same with a blank less.
 #[must_use]
 pub fn force_frame(force: &[f64; 3]) -> [u8; LINE] {
     let is_finite = force.iter().all(|part| part.is_finite());
