@@ -65,7 +65,7 @@ static int complete(void **library, const char *missing)
 }
 
 /* w x y z of a rotation matrix, by the largest of the four. NaN stays NaN. */
-static void quaternion(double m[3][3], double q[4])
+static inline void quaternion(double m[3][3], double q[4])
 {
     double trace = m[0][0] + m[1][1] + m[2][2], largest = trace, norm = 0;
     int at = -1;
@@ -96,7 +96,7 @@ static void quaternion(double m[3][3], double q[4])
 static void turned(const double from[3], double to[3]);
 
 /* The quaternion of a rotation in the vendor's axes: M R M^T, both indices go to ours. */
-static void turned_rotation(double frame[3][3], double q[4])
+static inline void turned_rotation(double frame[3][3], double q[4])
 {
     double rows[3][3], seen[3][3];
     for (int row = 0; row < 3; row++)

@@ -12,6 +12,7 @@ mod inputs_without_allocation;
 mod loopback;
 mod no_alloc;
 mod plugin;
+mod plugin_vendors;
 mod polhem;
 mod python;
 mod spidar;
