@@ -14,7 +14,7 @@ use taut_bridge::Rearm;
 
 use crate::support::stage::{
     BAD_SAMPLES, GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW,
-    PATIENCE, Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, ms, no_write_jumps, opened,
+    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, no_write_jumps, opened,
 };
 
 pub fn here() -> &'static Path {
