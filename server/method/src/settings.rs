@@ -57,6 +57,16 @@ pub struct Adaptation {
     pub threshold: f64,
 }
 
+impl Default for Adaptation {
+    /// 20 ms, 1 mm.
+    fn default() -> Self {
+        Self {
+            duration: 0.02,
+            threshold: -1e-3,
+        }
+    }
+}
+
 /// Gains, limits, lengths and capacities of the method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -121,10 +131,7 @@ impl Settings {
             k_h: 2000.0,
             damping_time: 0.0,
             rotation_metric: RotationMetric::Inertia,
-            adaptation: Some(Adaptation {
-                duration: 0.02,
-                threshold: -1e-3,
-            }),
+            adaptation: Some(Adaptation::default()),
             look_ahead: true,
             passive: false,
             force_limit: 20.0,

@@ -122,13 +122,13 @@ fn adaptation(section: &Section<'_>, key: &'static str) -> Option<Option<Adaptat
         return Some(None);
     }
     let table = section.section(key)?;
-    let duration = table.required_number("duration", Range::NotNegative, "duration = 0.02");
-    let threshold = table.required_number("threshold", Range::NotPositive, "threshold = -1e-3");
+    let default = Adaptation::default();
+    let adaptation = Adaptation {
+        duration: table.number_or("duration", Range::NotNegative, default.duration),
+        threshold: table.number_or("threshold", Range::NotPositive, default.threshold),
+    };
     table.finish();
-    Some(Some(Adaptation {
-        duration: duration?,
-        threshold: threshold?,
-    }))
+    Some(Some(adaptation))
 }
 
 fn solver(section: &Section<'_>, key: &'static str) -> Option<SolverKind> {

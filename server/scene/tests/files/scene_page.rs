@@ -120,3 +120,23 @@ fn the_pages_example_is_a_scene() {
         Scene::parse("scene-file.md", block, Path::new("")).unwrap();
     }
 }
+
+#[test]
+fn an_adaptation_that_says_one_number_has_the_other_of_the_page() {
+    let adaptation = |coupling: &str| {
+        let text = format!(
+            "name = \"x\"\n[god_object]\nmass = 1.0\nshape = {{ sphere = {{ radius = 0.01 }} }}\n\
+             pose = {{ position = [0.0, 0.0, 0.1] }}\n\
+             [[obstacle]]\nname = \"o\"\nshape = {{ plane = {{}} }}\n[coupling]\n{coupling}\n"
+        );
+        let scene = Scene::parse("s.toml", &text, Path::new("")).unwrap();
+        let settings = scene.build().unwrap().settings;
+        let adaptation = settings.adaptation.unwrap();
+        (adaptation.duration, adaptation.threshold)
+    };
+    assert_eq!(adaptation(""), (0.02, -1e-3));
+    let longer = adaptation("adaptation = { duration = 0.05 }");
+    assert_eq!(longer, (0.05, -1e-3));
+    let finer = adaptation("adaptation = { threshold = -1e-4 }");
+    assert_eq!(finer, (0.02, -1e-4));
+}
