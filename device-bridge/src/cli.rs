@@ -116,11 +116,11 @@ pub struct SafetyArgs {
     #[arg(long, value_name = "NM", default_value_t = 0.5)]
     pub max_torque: f64,
 
-    /// Fastest change of the force, in N per ms.
+    /// Fastest change of the force, in N per ms, beside what the device's motion explains.
     #[arg(long, value_name = "N/MS", default_value_t = SafetySettings::FORCE_RATE * 1e-3)]
     pub force_slew: f64,
 
-    /// Fastest change of the torque, in N m per ms.
+    /// Fastest change of the torque, in N m per ms, the same.
     #[arg(long, value_name = "NM/MS", default_value_t = SafetySettings::TORQUE_RATE * 1e-3)]
     pub torque_slew: f64,
 
@@ -129,8 +129,8 @@ pub struct SafetyArgs {
     #[arg(long, value_name = "N/M", default_value_t = ContactBound::default().stiffness)]
     pub contact_stiffness: f64,
 
-    /// Who arms at the start, after a fault and after an outage: automatic or manual (console, button). Without it a simulated hand and a trace arm by
-    /// themselves, and any other device waits for a person.
+    /// Who arms at the start, after a fault and after an outage: automatic or manual (console, button). Without it a simulated device and one
+    /// without motors arm by themselves, and any other waits for a person.
     #[arg(long, value_name = "WHO", value_parser = parse_rearm)]
     pub rearm: Option<Rearm>,
 

@@ -18,7 +18,7 @@ pub struct KeysArgs {
     /// Make credentials from this cluster key
     #[arg(long, value_name = "FILE")]
     pub master: Option<PathBuf>,
-    /// For every node of this workbench file, and for device, tracker, operator and observer
+    /// For every node of this workbench file, and one for each other role that it lets in
     #[arg(long, value_name = "F", requires = "master", conflicts_with = "role")]
     pub config: Option<PathBuf>,
     /// For one role: render, device, tracker, operator, observer, force
