@@ -13,14 +13,6 @@
  *
  * No device was at hand. Not known: whether the controller lets go when its program is gone, and how long a call takes over USB.
  */
-#define _POSIX_C_SOURCE 200809L
-#include <stdbool.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "taut_device.h"
 #include "vendor.h"
 
 enum { DHD_TIMEGUARD = 1 };
@@ -47,7 +39,7 @@ static struct {
 struct device {
     char id;
     bool has_wrist, turns;
-    double force, torque, stiffness, rotational_stiffness;
+    struct limits limits;
 };
 
 static const char *last(void) { return dhd.ErrorGetLastStr ? dhd.ErrorGetLastStr() : NULL; }
@@ -58,11 +50,8 @@ static const char *last(void) { return dhd.ErrorGetLastStr ? dhd.ErrorGetLastStr
 static int load(const char *path)
 {
     const char *missing = NULL;
-    if (dhd.library)
-        return TAUT_DEVICE_OK;
-    dhd.library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    if (!dhd.library)
-        return fail(TAUT_DEVICE_FAILED, "Force Dimension's library cannot be loaded (option library=PATH)", dlerror());
+    if (loaded(&dhd.library, path, "Force Dimension's") != TAUT_DEVICE_OK)
+        return TAUT_DEVICE_FAILED;
     FIND(OpenID, &missing);
     FIND(Open, &missing);
     FIND(Close, &missing);
@@ -92,38 +81,14 @@ static int32_t device_close(void *opened)
 
 static int32_t device_open(const char *options, void **opened)
 {
-    struct device wanted = {-1, false, false, 5.0, 0.1, 1000.0, 0.5}, *device;
+    struct device wanted = {.limits = {5.0, 0.1, 1000.0, 0.5}}, *device;
     double wanted_id = -1;
-    char copy[1024], *library = "libdhd.so", *rest = NULL;
+    const char *library = "libdhd.so";
+    const struct option known[] = {TEXT("library", &library), WHOLE("id", 0, 15, &wanted_id), WITH_TORQUE(wanted.limits), {0}};
+    char copy[1024];
     int id, code;
 
-    if (strlen(options) >= sizeof copy)
-        return fail(TAUT_DEVICE_FAILED, "options", "they are too long");
-    strcpy(copy, options);
-    for (char *option = strtok_r(copy, ",", &rest); option; option = strtok_r(NULL, ",", &rest)) {
-        char *value = strchr(option, '=');
-        bool good;
-        if (!value)
-            return fail(TAUT_DEVICE_FAILED, "write NAME=VALUE instead of", option);
-        *value++ = 0;
-        if (!strcmp(option, "library"))
-            good = *(library = value) != 0;
-        else if (!strcmp(option, "id"))
-            good = number(value, 0, 15, &wanted_id);
-        else if (!strcmp(option, "force"))
-            good = number(value, 0.1, 100, &wanted.force);
-        else if (!strcmp(option, "torque"))
-            good = number(value, 0.001, 10, &wanted.torque);
-        else if (!strcmp(option, "stiffness"))
-            good = number(value, 1, 1e5, &wanted.stiffness);
-        else if (!strcmp(option, "rotational-stiffness"))
-            good = number(value, 0.001, 1e3, &wanted.rotational_stiffness);
-        else
-            return fail(TAUT_DEVICE_FAILED, "no such option; there are library, id, force, torque, stiffness, rotational-stiffness", option);
-        if (!good)
-            return fail(TAUT_DEVICE_FAILED, "no value for this option, or out of range", option);
-    }
-    if ((code = load(library)) != TAUT_DEVICE_OK)
+    if ((code = read_options(options, copy, known)) != TAUT_DEVICE_OK || (code = load(library)) != TAUT_DEVICE_OK)
         return code;
     id = wanted_id < 0 ? dhd.Open() : dhd.OpenID((char)wanted_id);
     if (id < 0)
@@ -150,14 +115,9 @@ static int32_t device_info(void *opened, taut_device_info *info)
 {
     const struct device *device = opened;
     const char *name = dhd.GetSystemName ? dhd.GetSystemName(device->id) : NULL;
-    snprintf(info->name, sizeof info->name, "Force Dimension %s", name ? name : "device");
-    info->sensed_degrees_of_freedom = device->has_wrist ? 6 : 3;
-    info->actuated_degrees_of_freedom = device->turns ? 6 : 3;
-    info->max_force = device->force;
-    info->max_torque = device->torque;
-    info->max_stiffness = device->stiffness;
-    info->max_rotational_stiffness = device->rotational_stiffness;
-    info->rate = 1000;
+    char whole[64];
+    snprintf(whole, sizeof whole, "Force Dimension %s", name ? name : "device");
+    describe(info, whole, device->has_wrist ? 6 : 3, device->turns ? 6 : 3, &device->limits);
     return TAUT_DEVICE_OK;
 }
 
@@ -202,12 +162,4 @@ static int32_t device_write(void *opened, const double wrench[6])
     /* Back to x towards the user, y right, z up. */
     int result = dhd.SetForceAndTorqueAndGripperForce(-wrench[1], wrench[0], wrench[2], -wrench[4], wrench[3], wrench[5], 0, device->id);
     return result < 0 ? fail(TAUT_DEVICE_GONE, "dhdSetForceAndTorqueAndGripperForce", last()) : TAUT_DEVICE_OK;
-}
-
-const taut_device_table *taut_device_entry(void)
-{
-    static const taut_device_table table = {
-        TAUT_DEVICE_VERSION, sizeof table, device_open, device_info, device_read, device_write, device_close, device_error_text,
-    };
-    return &table;
 }

@@ -15,10 +15,6 @@
  *
  * No device was at hand, and not the vendor's library.
  */
-#define _POSIX_C_SOURCE 200809L
-#include <pthread.h>
-#include <string.h>
-
 #include "vendor.h"
 
 enum {
@@ -40,7 +36,6 @@ enum {
     HD_FORCE_ERROR = 0x0204,
 };
 #define HD_INVALID_HANDLE 0xffffffffu
-#define OLDEST 0.02 /* s: of a force, and of a frame */
 
 typedef struct {
     unsigned code;
@@ -73,7 +68,7 @@ static struct {
 struct device {
     unsigned handle;
     unsigned long callback;
-    double force, stiffness;
+    struct limits limits;
     char name[64];
     /* What the servo thread and this one share; held for the copying of some numbers. */
     pthread_mutex_t lock;
@@ -92,11 +87,8 @@ struct device {
 static int load(const char *path)
 {
     const char *missing = NULL;
-    if (hd.library)
-        return TAUT_DEVICE_OK;
-    hd.library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    if (!hd.library)
-        return fail(TAUT_DEVICE_FAILED, "OpenHaptics' library cannot be loaded (install it; option library=PATH)", dlerror());
+    if (loaded(&hd.library, path, "OpenHaptics'") != TAUT_DEVICE_OK)
+        return TAUT_DEVICE_FAILED;
     FIND(InitDevice, &missing);
     FIND(DisableDevice, &missing);
     FIND(BeginFrame, &missing);
@@ -205,43 +197,23 @@ static int32_t device_close(void *opened)
 static int32_t device_open(const char *options, void **opened)
 {
     struct device *device;
-    double force = 1.0, stiffness = 300.0;
-    char copy[1024], *library = "libHD.so", *name = NULL, *rest = NULL;
-    const char *model;
+    struct limits limits = {.force = 1.0, .stiffness = 300.0};
+    const char *library = "libHD.so", *name = NULL, *model;
+    const struct option known[] = {
+        TEXT("library", &library), TEXT("name", &name), NUMBER("force", 0.1, 40, &limits.force), NUMBER("stiffness", 1, 1e4, &limits.stiffness), {0},
+    };
+    char copy[1024];
     unsigned error;
     int code;
 
-    if (strlen(options) >= sizeof copy)
-        return fail(TAUT_DEVICE_FAILED, "options", "they are too long");
-    strcpy(copy, options);
-    for (char *option = strtok_r(copy, ",", &rest); option; option = strtok_r(NULL, ",", &rest)) {
-        char *value = strchr(option, '=');
-        bool good;
-        if (!value)
-            return fail(TAUT_DEVICE_FAILED, "write NAME=VALUE instead of", option);
-        *value++ = 0;
-        if (!strcmp(option, "library"))
-            good = *(library = value) != 0;
-        else if (!strcmp(option, "name"))
-            good = *(name = value) != 0;
-        else if (!strcmp(option, "force"))
-            good = number(value, 0.1, 40, &force);
-        else if (!strcmp(option, "stiffness"))
-            good = number(value, 1, 1e4, &stiffness);
-        else
-            return fail(TAUT_DEVICE_FAILED, "no such option; there are library, name, force, stiffness", option);
-        if (!good)
-            return fail(TAUT_DEVICE_FAILED, "no value for this option, or out of range", option);
-    }
-    if ((code = load(library)) != TAUT_DEVICE_OK)
+    if ((code = read_options(options, copy, known)) != TAUT_DEVICE_OK || (code = load(library)) != TAUT_DEVICE_OK)
         return code;
     device = calloc(1, sizeof *device);
     if (!device || pthread_mutex_init(&device->lock, NULL)) {
         free(device);
         return fail(TAUT_DEVICE_FAILED, "hdInitDevice", "no memory");
     }
-    device->force = force;
-    device->stiffness = stiffness;
+    device->limits = limits;
     device->handle = hd.InitDevice(name);
     error = failed();
     if (device->handle == HD_INVALID_HANDLE || error) {
@@ -267,12 +239,7 @@ static int32_t device_open(const char *options, void **opened)
 static int32_t device_info(void *opened, taut_device_info *info)
 {
     const struct device *device = opened;
-    memcpy(info->name, device->name, sizeof info->name);
-    info->sensed_degrees_of_freedom = 6;
-    info->actuated_degrees_of_freedom = 3;
-    info->max_force = device->force;
-    info->max_stiffness = device->stiffness;
-    info->rate = 1000;
+    describe(info, device->name, 6, 3, &device->limits);
     return TAUT_DEVICE_OK;
 }
 
@@ -339,12 +306,4 @@ static int32_t device_write(void *opened, const double wrench[6])
     device->written = now();
     pthread_mutex_unlock(&device->lock);
     return let_go ? TAUT_DEVICE_NOTHING_NEW : TAUT_DEVICE_OK;
-}
-
-const taut_device_table *taut_device_entry(void)
-{
-    static const taut_device_table table = {
-        TAUT_DEVICE_VERSION, sizeof table, device_open, device_info, device_read, device_write, device_close, device_error_text,
-    };
-    return &table;
 }

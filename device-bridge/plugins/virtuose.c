@@ -16,9 +16,6 @@
  *
  * No device was at hand, and not the vendor's library. The vendor's watchdog is said to let go after 2 s only.
  */
-#define _POSIX_C_SOURCE 200809L
-#include <string.h>
-
 #include "vendor.h"
 
 enum {
@@ -53,7 +50,7 @@ static struct {
 struct device {
     void *context;
     bool renders; /* power, and no indexing, at the last reading */
-    double force, torque, stiffness, rotational_stiffness;
+    struct limits limits;
 };
 
 /* What went wrong last; of opening with NULL. */
@@ -65,11 +62,8 @@ static const char *last(void *context) { return virt.GetErrorMessage(virt.GetErr
 static int load(const char *path)
 {
     const char *missing = NULL;
-    if (virt.library)
-        return TAUT_DEVICE_OK;
-    virt.library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    if (!virt.library)
-        return fail(TAUT_DEVICE_FAILED, "Haption's library cannot be loaded (option library=PATH)", dlerror());
+    if (loaded(&virt.library, path, "Haption's") != TAUT_DEVICE_OK)
+        return TAUT_DEVICE_FAILED;
     FIND(Open);
     FIND(Close);
     FIND(SetIndexingMode);
@@ -126,38 +120,13 @@ static const char *prepared(void *context)
 
 static int32_t device_open(const char *options, void **opened)
 {
-    struct device wanted = {NULL, false, 5.0, 0.3, 500.0, 1.0}, *device;
-    char copy[1024], *library = "libVirtuoseAPI.so", *host = "127.0.0.1#53210", *rest = NULL;
-    const char *failed;
+    struct device wanted = {.limits = {5.0, 0.3, 500.0, 1.0}}, *device;
+    const char *library = "libVirtuoseAPI.so", *host = "127.0.0.1#53210", *failed;
+    const struct option known[] = {TEXT("library", &library), TEXT("host", &host), WITH_TORQUE(wanted.limits), {0}};
+    char copy[1024];
     int code;
 
-    if (strlen(options) >= sizeof copy)
-        return fail(TAUT_DEVICE_FAILED, "options", "they are too long");
-    strcpy(copy, options);
-    for (char *option = strtok_r(copy, ",", &rest); option; option = strtok_r(NULL, ",", &rest)) {
-        char *value = strchr(option, '=');
-        bool good;
-        if (!value)
-            return fail(TAUT_DEVICE_FAILED, "write NAME=VALUE instead of", option);
-        *value++ = 0;
-        if (!strcmp(option, "library"))
-            good = *(library = value) != 0;
-        else if (!strcmp(option, "host"))
-            good = *(host = value) != 0;
-        else if (!strcmp(option, "force"))
-            good = number(value, 0.1, 100, &wanted.force);
-        else if (!strcmp(option, "torque"))
-            good = number(value, 0.001, 10, &wanted.torque);
-        else if (!strcmp(option, "stiffness"))
-            good = number(value, 1, 1e5, &wanted.stiffness);
-        else if (!strcmp(option, "rotational-stiffness"))
-            good = number(value, 0.001, 1e3, &wanted.rotational_stiffness);
-        else
-            return fail(TAUT_DEVICE_FAILED, "no such option; there are library, host, force, torque, stiffness, rotational-stiffness", option);
-        if (!good)
-            return fail(TAUT_DEVICE_FAILED, "no value for this option, or out of range", option);
-    }
-    if ((code = load(library)) != TAUT_DEVICE_OK)
+    if ((code = read_options(options, copy, known)) != TAUT_DEVICE_OK || (code = load(library)) != TAUT_DEVICE_OK)
         return code;
     device = malloc(sizeof *device);
     if (!device)
@@ -169,7 +138,7 @@ static int32_t device_open(const char *options, void **opened)
         return fail(TAUT_DEVICE_GONE, "no Virtuose answers there (option host=ADDRESS)", last(NULL));
     }
     if ((failed = prepared(device->context))) {
-        char why[sizeof text];
+        char why[128];
         snprintf(why, sizeof why, "%s", last(device->context));
         device_close(device);
         return fail(TAUT_DEVICE_FAILED, failed, why);
@@ -181,14 +150,7 @@ static int32_t device_open(const char *options, void **opened)
 static int32_t device_info(void *opened, taut_device_info *info)
 {
     const struct device *device = opened;
-    snprintf(info->name, sizeof info->name, "Haption Virtuose");
-    info->sensed_degrees_of_freedom = 6;
-    info->actuated_degrees_of_freedom = 6;
-    info->max_force = device->force;
-    info->max_torque = device->torque;
-    info->max_stiffness = device->stiffness;
-    info->max_rotational_stiffness = device->rotational_stiffness;
-    info->rate = 1000;
+    describe(info, "Haption Virtuose", 6, 6, &device->limits);
     return TAUT_DEVICE_OK;
 }
 
@@ -251,12 +213,4 @@ static int32_t device_write(void *opened, const double wrench[6])
     if (virt.SetForce(device->context, sent))
         return fail(TAUT_DEVICE_GONE, "virtSetForce", last(device->context));
     return device->renders ? TAUT_DEVICE_OK : TAUT_DEVICE_NOT_READY;
-}
-
-const taut_device_table *taut_device_entry(void)
-{
-    static const taut_device_table table = {
-        TAUT_DEVICE_VERSION, sizeof table, device_open, device_info, device_read, device_write, device_close, device_error_text,
-    };
-    return &table;
 }

@@ -32,21 +32,6 @@ fn documented(name: &str) -> (tempfile::TempDir, String) {
     (folder, format!("plugin:{}", plugin.display()))
 }
 
-/// Each of these options is refused, and what is wrong is named.
-fn refused(bare: &str, options: &[(&str, &str)]) {
-    for (options, named) in options {
-        let said = opened(&format!("{bare},{options}")).err().expect(options);
-        assert!(said.contains(named), "{options}: {said}");
-    }
-}
-
-fn not_there_while_unplugged(choice: &str, inside: &Loaded) {
-    inside.set("mode", UNPLUGGED);
-    let said = opened(choice).err().expect("none is plugged in");
-    assert!(said.contains("no device found"), "{said}");
-    inside.set("mode", GOOD);
-}
-
 /// How near numbers of a library's are.
 #[derive(Clone, Copy)]
 struct Near {
@@ -83,151 +68,150 @@ fn lies_where_the_stand_in_is(mut device: Box<dyn Device>, turn: Vector3<f64>, n
     assert_eq!(sample.buttons, 2);
 }
 
-#[test]
-fn openhaptics_functions_are_called_as_published() {
-    let (folder, bare) = documented("hd");
-    let vendor = stand_in(folder.path(), "stand_in_hd.c", "HD");
-    let inside = Loaded::of(&vendor);
-    refused(
-        &bare,
-        &[
-            (
-                "library=/no/libHD.so",
-                "cannot be loaded (install it; option library=PATH)",
-            ),
-            ("force=1e9", "out of range: force"),
-            ("colour=red", "there are library, name, force, stiffness"),
-            (
-                &format!("library={}/strict.so", folder.path().display()),
-                "it lacks: hdInitDevice",
-            ),
-        ],
-    );
-    let choice = format!(
-        "{bare},library={},name=Left Device,force=8,stiffness=800",
-        vendor.display()
-    );
-    not_there_while_unplugged(&choice, &inside);
+/// A vendor's plug-in, and what is expected of it on the stand-in of its library.
+struct Vendor {
+    name: &'static str,
+    /// Its options, as they are told to who writes another.
+    options: &'static str,
+    /// The function of the library that another library is said to lack.
+    first_function: &'static str,
+    /// The options that find the stand-in.
+    finding: &'static str,
+    /// Options of its own that are refused, and what is named then.
+    refused: &'static [(&'static str, &'static str)],
+    /// What its device is called.
+    device: &'static str,
+    actuated: u8,
+    /// N m, with `force=8` and `torque=0.3` where it turns.
+    max_torque: f64,
+    /// How the stand-in is turned, on the workbench.
+    turn: Vector3<f64>,
+    near: Near,
+    /// Ways in which it goes wrong.
+    modes: &'static [i64],
+}
 
-    // Where the workbench has it: right, away from the user, up; and turned about the axis to the right.
-    let device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
-    assert_eq!(device.info().name, "3D Systems stand-in Touch");
-    let freedoms = (
-        device.info().sensed_degrees_of_freedom,
-        device.info().actuated_degrees_of_freedom,
+fn is_called_as_published(vendor: &Vendor) {
+    let (folder, bare) = documented(vendor.name);
+    let source = format!("stand_in_{}.c", vendor.name);
+    let library = stand_in(folder.path(), &source, "VENDOR");
+    let inside = Loaded::of(&library);
+    let found = format!("{bare},library={}", library.display());
+    let lacks = format!("it lacks: {}", vendor.first_function);
+    let strict = format!("{bare},library={}/strict.so", folder.path().display());
+    let refused = |choice: &str, named: &str| {
+        let said = opened(choice).err().expect(choice);
+        assert!(said.contains(named), "{choice}: {said}");
+    };
+    let missing = "library cannot be loaded (install it; option library=PATH)";
+    refused(&format!("{bare},library=/no/lib.so"), missing);
+    refused(&strict, &lacks);
+    refused(&format!("{found},force=1e9"), "out of range: force");
+    refused(
+        &format!("{found},colour=red"),
+        &format!("there are {}: colour", vendor.options),
     );
-    assert_eq!(freedoms, (6, 3));
-    assert_eq!(device.info().limits.max_force, 8.0);
-    lies_where_the_stand_in_is(device, Vector3::x() * 2.5, DOUBLE);
+    for &(options, named) in vendor.refused {
+        refused(&format!("{found},{options}"), named);
+    }
+    let choice = format!("{found},{},force=8", vendor.finding);
+    inside.set("mode", UNPLUGGED);
+    refused(&choice, "no device found");
+    inside.set("mode", GOOD);
+
+    // Where the workbench has it: right, away from the user, up.
+    let device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
+    let info = device.info();
+    assert_eq!(info.name, vendor.device);
+    let freedoms = (
+        info.sensed_degrees_of_freedom,
+        info.actuated_degrees_of_freedom,
+    );
+    assert_eq!(freedoms, (6, vendor.actuated));
+    let most = (info.limits.max_force, info.limits.max_torque);
+    assert_eq!(most, (8.0, vendor.max_torque));
+    lies_where_the_stand_in_is(device, vendor.turn, vendor.near);
     inside.wait("it is closed", &|| inside.get("closes") > 0);
 
-    let modes = [
-        (HANGS, "was lost"),
-        (NOT_A_NUMBER, "not finite"),
-        (TOO_HOT, "was lost"),
-        (UNPLUGGED, "was lost"),
-        (NOT_CALIBRATED, "was lost"),
-    ];
+    let named = |mode| {
+        if mode == NOT_A_NUMBER {
+            "not finite"
+        } else {
+            "was lost"
+        }
+    };
+    let modes: Vec<_> = vendor
+        .modes
+        .iter()
+        .map(|&mode| (mode, named(mode)))
+        .collect();
     goes_wrong(&choice, &inside, &modes);
+}
+
+#[test]
+fn openhaptics_functions_are_called_as_published() {
+    is_called_as_published(&Vendor {
+        name: "hd",
+        options: "library, name, force, stiffness",
+        first_function: "hdInitDevice",
+        finding: "name=Left Device,stiffness=800",
+        refused: &[("name=", "no value for this option, or out of range: name")],
+        device: "3D Systems stand-in Touch",
+        actuated: 3,
+        max_torque: 0.0,
+        turn: Vector3::x() * 2.5,
+        near: DOUBLE,
+        modes: &[HANGS, NOT_A_NUMBER, TOO_HOT, UNPLUGGED, NOT_CALIBRATED],
+    });
 }
 
 #[test]
 fn force_dimension_s_functions_are_called_as_published() {
-    let (folder, bare) = documented("dhd");
-    let vendor = stand_in(folder.path(), "stand_in_dhd.c", "DHD");
-    let inside = Loaded::of(&vendor);
-    refused(
-        &bare,
-        &[
-            (
-                "library=/no/libdhd.so",
-                "cannot be loaded (option library=PATH)",
-            ),
-            ("force=1e9", "out of range: force"),
-            ("colour=red", "there are library, id, force"),
+    is_called_as_published(&Vendor {
+        name: "dhd",
+        options: "library, id, force, torque, stiffness, rotational-stiffness",
+        first_function: "dhdOpenID",
+        finding: "id=2,torque=0.3",
+        refused: &[
             ("id", "write NAME=VALUE instead of: id"),
-            (
-                &format!("library={}/strict.so", folder.path().display()),
-                "it lacks: dhdOpenID",
-            ),
+            ("id=2.5", "out of range: id"),
         ],
-    );
-    let choice = format!(
-        "{bare},library={},id=2,force=8,torque=0.3",
-        vendor.display()
-    );
-    not_there_while_unplugged(&choice, &inside);
-
-    // Where the workbench has it: right, away from the user, up; and turned about the axis away from the user.
-    let device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
-    assert_eq!(device.info().name, "Force Dimension stand-in.6");
-    assert_eq!(
-        (
-            device.info().limits.max_force,
-            device.info().limits.max_torque
-        ),
-        (8.0, 0.3)
-    );
-    lies_where_the_stand_in_is(device, Vector3::y() * -2.5, DOUBLE);
-
-    let modes = [
-        (HANGS, "was lost"),
-        (NOT_A_NUMBER, "not finite"),
-        (TOO_HOT, "was lost"),
-        (UNPLUGGED, "was lost"),
-        (NOTHING_NEW, "was lost"),
-    ];
-    goes_wrong(&choice, &inside, &modes);
-    assert!(inside.get("closes") > 0);
+        device: "Force Dimension stand-in.6",
+        actuated: 6,
+        max_torque: 0.3,
+        turn: Vector3::y() * -2.5,
+        near: DOUBLE,
+        modes: &[HANGS, NOT_A_NUMBER, TOO_HOT, UNPLUGGED, NOTHING_NEW],
+    });
 }
 
 #[test]
 fn virtuose_functions_are_called_as_published() {
-    let (folder, bare) = documented("virtuose");
-    let vendor = stand_in(folder.path(), "stand_in_virtuose.c", "VIRT");
-    let inside = Loaded::of(&vendor);
-    refused(
-        &bare,
-        &[
-            (
-                "library=/no/libVirtuoseAPI.so",
-                "cannot be loaded (option library=PATH)",
-            ),
-            ("force=1e9", "out of range: force"),
-            ("colour=red", "there are library, host, force"),
+    is_called_as_published(&Vendor {
+        name: "virtuose",
+        options: "library, host, force, torque, stiffness, rotational-stiffness",
+        first_function: "virtOpen",
+        finding: "host=10.0.0.7#53210,torque=0.3",
+        refused: &[
             ("host=", "no value for this option, or out of range: host"),
             (
-                &format!("library={}/strict.so", folder.path().display()),
-                "it lacks: virtOpen",
-            ),
-            (
-                &format!("library={},host=10.0.0.8", vendor.display()),
+                "host=10.0.0.8",
                 "no Virtuose answers there (option host=ADDRESS): no device found",
             ),
         ],
-    );
-    let choice = format!(
-        "{bare},library={},host=10.0.0.7#53210,force=8,torque=0.3",
-        vendor.display()
-    );
-    not_there_while_unplugged(&choice, &inside);
-
-    // Where the workbench has it: right, away from the user, up; and turned about the axis away from the user.
-    let device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
-    let info = device.info();
-    assert_eq!(info.name, "Haption Virtuose");
-    assert_eq!((info.limits.max_force, info.limits.max_torque), (8.0, 0.3));
-    lies_where_the_stand_in_is(device, Vector3::y() * -2.5, FLOAT);
-    inside.wait("it is closed", &|| inside.get("closes") > 0);
-
-    // The last two: the offset button is pressed, and the power is off.
-    let modes = [
-        (HANGS, "was lost"),
-        (NOT_A_NUMBER, "not finite"),
-        (TOO_HOT, "was lost"),
-        (UNPLUGGED, "was lost"),
-        (NOTHING_NEW, "was lost"),
-        (NOT_CALIBRATED, "was lost"),
-    ];
-    goes_wrong(&choice, &inside, &modes);
+        device: "Haption Virtuose",
+        actuated: 6,
+        max_torque: 0.3,
+        turn: Vector3::y() * -2.5,
+        near: FLOAT,
+        // The last two: the offset button is pressed, and the power is off.
+        modes: &[
+            HANGS,
+            NOT_A_NUMBER,
+            TOO_HOT,
+            UNPLUGGED,
+            NOTHING_NEW,
+            NOT_CALIBRATED,
+        ],
+    });
 }
