@@ -1,7 +1,7 @@
 /*
  * Force Dimension's devices (omega, delta, sigma, lambda) as a plug-in of taut, by the vendor's own library, which is loaded at run time.
  *
- *   cc -std=c11 -O2 -shared -fPIC -I include -o taut_dhd.so plugins/dhd.c -ldl -lm
+ *   cc -std=c11 -O2 -shared -fPIC -I include -o taut_dhd.so plugins/dhd.c -ldl -lm -lpthread
  *   taut bridge --device plugin:/path/taut_dhd.so,library=/path/libdhd.so,force=5,...
  *
  * Options: library (default libdhd.so), id (device number, default the first), force (N, 5), torque (N m, 0.1), stiffness (N/m, 1000),
@@ -13,7 +13,7 @@
  *
  * No device was at hand. Not known: whether the controller lets go when its program is gone, and how long a call takes over USB.
  */
-#include "vendor.h"
+#include "watched.h"
 
 enum { DHD_TIMEGUARD = 1 };
 
@@ -37,6 +37,7 @@ static struct {
 } dhd;
 
 struct device {
+    struct watched watched;
     char id;
     bool has_wrist, turns;
     struct limits limits;
@@ -69,7 +70,7 @@ static int load(const char *path)
     return complete(&dhd.library, missing);
 }
 
-static int32_t device_close(void *opened)
+static int32_t shut(void *opened)
 {
     struct device *device = opened;
     int zero = dhd.SetForceAndTorqueAndGripperForce(0, 0, 0, 0, 0, 0, 0, device->id);
@@ -104,11 +105,10 @@ static int32_t device_open(const char *options, void **opened)
     *device = wanted;
     if (dhd.SetForceAndTorqueAndGripperForce(0, 0, 0, 0, 0, 0, 0, device->id) < 0 || dhd.EnableForce(1, device->id) < 0) {
         code = fail(TAUT_DEVICE_FAILED, "dhdEnableForce", last());
-        device_close(device);
+        shut(device);
         return code;
     }
-    *opened = device;
-    return TAUT_DEVICE_OK;
+    return watched_from_now(device, opened);
 }
 
 static int32_t device_info(void *opened, taut_device_info *info)
@@ -129,7 +129,7 @@ static void turned(const double from[3], double to[3])
     to[2] = from[2];
 }
 
-static int32_t device_read(void *opened, taut_device_sample *sample)
+static int32_t measure(void *opened, taut_device_sample *sample)
 {
     const struct device *device = opened;
     double p[3], v[3], w[3], frame[3][3];
@@ -156,7 +156,7 @@ static int32_t device_read(void *opened, taut_device_sample *sample)
     return TAUT_DEVICE_OK;
 }
 
-static int32_t device_write(void *opened, const double wrench[6])
+static int32_t render(void *opened, const double wrench[6])
 {
     const struct device *device = opened;
     /* Back to x towards the user, y right, z up. */

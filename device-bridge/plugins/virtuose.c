@@ -1,7 +1,7 @@
 /*
  * Haption's devices (Virtuose) as a plug-in of taut, by the vendor's own library, which is loaded at run time.
  *
- *   cc -std=c11 -O2 -shared -fPIC -I include -o taut_virtuose.so plugins/virtuose.c -ldl -lm
+ *   cc -std=c11 -O2 -shared -fPIC -I include -o taut_virtuose.so plugins/virtuose.c -ldl -lm -lpthread
  *   taut bridge --device plugin:/path/taut_virtuose.so,library=/path/libVirtuoseAPI.so,host=192.168.1.13,force=5,...
  *
  * Options: library (default libVirtuoseAPI.so), host (of the controller as virtOpen takes it, default 127.0.0.1#53210), force (N, 5), torque (N m, 0.3),
@@ -14,9 +14,9 @@
  * The pose is the physical one, of the handle in the base frame: it stays where the hand is, whatever was indexed. While the offset button is pressed, the
  * power is off or nobody holds the handle, the device renders no force: then it is not ready.
  *
- * No device was at hand, and not the vendor's library. The vendor's watchdog is said to let go after 2 s only.
+ * No device was at hand, and not the vendor's library. Where the whole program is gone, the vendor's watchdog is said to let go after 2 s only.
  */
-#include "vendor.h"
+#include "watched.h"
 
 enum {
     COMMAND_TYPE_IMPEDANCE = 3,
@@ -48,6 +48,7 @@ static struct {
 } virt;
 
 struct device {
+    struct watched watched;
     void *context;
     bool renders; /* power, and no indexing, at the last reading */
     struct limits limits;
@@ -86,7 +87,7 @@ static int load(const char *path)
 }
 
 /* Each is tried, whatever became of the one before. */
-static int32_t device_close(void *opened)
+static int32_t shut(void *opened)
 {
     struct device *device = opened;
     float none[6] = {0};
@@ -140,11 +141,10 @@ static int32_t device_open(const char *options, void **opened)
     if ((failed = prepared(device->context))) {
         char why[128];
         snprintf(why, sizeof why, "%s", last(device->context));
-        device_close(device);
+        shut(device);
         return fail(TAUT_DEVICE_FAILED, failed, why);
     }
-    *opened = device;
-    return TAUT_DEVICE_OK;
+    return watched_from_now(device, opened);
 }
 
 static int32_t device_info(void *opened, taut_device_info *info)
@@ -168,7 +168,7 @@ static void turned_float(const float from[3], double to[3])
     turned(seen, to);
 }
 
-static int32_t device_read(void *opened, taut_device_sample *sample)
+static int32_t measure(void *opened, taut_device_sample *sample)
 {
     struct device *device = opened;
     float pose[7], speed[6];
@@ -199,7 +199,7 @@ static int32_t device_read(void *opened, taut_device_sample *sample)
     return TAUT_DEVICE_OK;
 }
 
-static int32_t device_write(void *opened, const double wrench[6])
+static int32_t render(void *opened, const double wrench[6])
 {
     const struct device *device = opened;
     float sent[6] = {0};

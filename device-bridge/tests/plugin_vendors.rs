@@ -1,6 +1,7 @@
 //! The plug-ins of vendors, on stand-ins of their libraries. All are built here by `cc`.
 #![cfg(unix)]
 
+use std::path::Path;
 use std::process::Command as Process;
 use std::time::Instant;
 
@@ -68,6 +69,29 @@ fn lies_where_the_stand_in_is(mut device: Box<dyn Device>, turn: Vector3<f64>, n
     assert_eq!(sample.buttons, 2);
 }
 
+/// A program that calls the plug-in as taut does, and hangs outside of it, leaves no force: see caller.c.
+fn lets_go_of_a_caller_that_hangs(folder: &Path, vendor: &Vendor, library: &Path) {
+    let caller = folder.join("caller");
+    let mut cc = Process::new("cc");
+    cc.args(["-Wall", "-Wextra", "-Werror", "-O1", "-I"])
+        .arg(here().join("include"))
+        .arg(here().join("tests/plugin_c/caller.c"))
+        .arg("-o")
+        .arg(&caller)
+        .arg("-ldl");
+    assert!(cc.status().expect("cc").success(), "the caller");
+    let options = format!("library={},{}", library.display(), vendor.finding);
+    let mut called = Process::new(caller);
+    called
+        .arg(folder.join(format!("taut_{}.so", vendor.name)))
+        .arg(library)
+        .arg(options);
+    let out = called.output().expect("it was built");
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{}: {said}", vendor.name);
+    println!("{}", String::from_utf8_lossy(&out.stdout));
+}
+
 /// A vendor's plug-in, and what is expected of it on the stand-in of its library.
 struct Vendor {
     name: &'static str,
@@ -114,6 +138,7 @@ fn is_called_as_published(vendor: &Vendor) {
     for &(options, named) in vendor.refused {
         refused(&format!("{found},{options}"), named);
     }
+    lets_go_of_a_caller_that_hangs(folder.path(), vendor, &library);
     let choice = format!("{found},{},force=8", vendor.finding);
     inside.set("mode", UNPLUGGED);
     refused(&choice, "no device found");
