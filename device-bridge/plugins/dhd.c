@@ -11,13 +11,19 @@
  * a device's number is a char; results below 0 are errors, 1 (DHD_TIMEGUARD) is the reading of before, 2 (DHD_MOTOR_SATURATED) a force that was
  * cut. Axes there: x towards the user, y right, z up. Here: x right, y away, z up.
  *
- * No device was at hand. Not known: whether the controller lets go when its program is gone, and how long a call takes over USB.
+ * No device was at hand. Not known: which controllers have the watchdog that is set here (dhdSetWatchdog, 32 ms), and how long a call takes over USB.
  */
 #include "watched.h"
 
-enum { DHD_TIMEGUARD = 1 };
+enum {
+    DHD_TIMEGUARD = 1,
+    DHD_STATUS_FORCE = 5,
+    DHD_STATUS_FORCEOFFCAUSE = 14,
+    DHD_FORCEOFF_WATCHDOG = 3,
+};
+#define LONGEST 255 /* of the controller's watchdog: 0.125 ms each */
 
-/* The functions of the vendor's library. The last three are younger than the rest and may be missing. */
+/* The functions of the vendor's library. Those from GetSystemName on may be missing. */
 static struct {
     void *library;
     int (*Open)(void);
@@ -34,12 +40,21 @@ static struct {
     bool (*HasActiveWrist)(char);
     int (*GetAngularVelocityRad)(double *, double *, double *, char);
     unsigned (*GetButtonMask)(char);
+    int (*GetStatus)(int *, char);
+    int (*EnableExpertMode)(void);
+    int (*DisableExpertMode)(void);
+    int (*GetWatchdog)(unsigned char *, char);
+    int (*SetWatchdog)(unsigned char, char);
 } dhd;
 
 struct device {
     struct watched watched;
     char id;
     bool has_wrist, turns;
+    bool renders;        /* its forces were on at the last look */
+    bool is_watched;     /* by its controller, too */
+    unsigned char steps; /* of the controller's watchdog, as it was before */
+    unsigned reads;
     struct limits limits;
 };
 
@@ -67,15 +82,48 @@ static int load(const char *path)
     FIND(HasActiveWrist, NULL);
     FIND(GetAngularVelocityRad, NULL);
     FIND(GetButtonMask, NULL);
+    FIND(GetStatus, NULL);
+    FIND(EnableExpertMode, NULL);
+    FIND(DisableExpertMode, NULL);
+    FIND(GetWatchdog, NULL);
+    FIND(SetWatchdog, NULL);
     return complete(&dhd.library, missing);
+}
+
+/* The wrench, back to x towards the user, y right, z up. */
+static int push(const struct device *device, const double wrench[6])
+{
+    return dhd.SetForceAndTorqueAndGripperForce(-wrench[1], wrench[0], wrench[2], -wrench[4], wrench[3], wrench[5], 0, device->id);
+}
+
+/* How long the controller's firmware waits for a force before it ends the last one, 0.125 ms each; the vendor asks for expert mode. */
+static bool watch_for(const struct device *device, unsigned char *before, unsigned char steps)
+{
+    bool watches = dhd.EnableExpertMode() >= 0 && dhd.GetWatchdog(before, device->id) >= 0 && dhd.SetWatchdog(steps, device->id) >= 0;
+    return dhd.DisableExpertMode() >= 0 && watches;
+}
+
+/* Whether somebody or something has put its forces off: its button, its limit of speed, its watchdog. */
+static bool is_off(const struct device *device)
+{
+    int status[32] = {0}; /* more than any version has */
+    if (!dhd.GetStatus || dhd.GetStatus(status, device->id) < 0 || status[DHD_STATUS_FORCE] || !status[DHD_STATUS_FORCEOFFCAUSE])
+        return false;
+    /* This program stood still for longer: nobody has put them off. */
+    if (status[DHD_STATUS_FORCEOFFCAUSE] == DHD_FORCEOFF_WATCHDOG && push(device, no_wrench) >= 0)
+        dhd.EnableForce(1, device->id);
+    return true;
 }
 
 static int32_t shut(void *opened)
 {
     struct device *device = opened;
-    int zero = dhd.SetForceAndTorqueAndGripperForce(0, 0, 0, 0, 0, 0, 0, device->id);
+    unsigned char steps;
+    int closed, zero = push(device, no_wrench);
     int off = dhd.EnableForce(0, device->id);
-    int closed = dhd.Close(device->id);
+    if (device->is_watched)
+        watch_for(device, &steps, device->steps);
+    closed = dhd.Close(device->id);
     free(device);
     return zero < 0 || off < 0 || closed < 0 ? fail(TAUT_DEVICE_FAILED, "dhdClose", last()) : TAUT_DEVICE_OK;
 }
@@ -103,7 +151,10 @@ static int32_t device_open(const char *options, void **opened)
         return fail(TAUT_DEVICE_FAILED, "dhdOpen", "no memory");
     }
     *device = wanted;
-    if (dhd.SetForceAndTorqueAndGripperForce(0, 0, 0, 0, 0, 0, 0, device->id) < 0 || dhd.EnableForce(1, device->id) < 0) {
+    /* So that a program that is gone leaves no force; the next program has what was set before. */
+    if (dhd.EnableExpertMode && dhd.DisableExpertMode && dhd.GetWatchdog && dhd.SetWatchdog)
+        device->is_watched = watch_for(device, &device->steps, LONGEST);
+    if (push(device, no_wrench) < 0 || dhd.EnableForce(1, device->id) < 0) {
         code = fail(TAUT_DEVICE_FAILED, "dhdEnableForce", last());
         shut(device);
         return code;
@@ -131,11 +182,16 @@ static void turned(const double from[3], double to[3])
 
 static int32_t measure(void *opened, taut_device_sample *sample)
 {
-    const struct device *device = opened;
+    struct device *device = opened;
     double p[3], v[3], w[3], frame[3][3];
     int result = dhd.GetPosition(&p[0], &p[1], &p[2], device->id);
     if (result < 0)
         return fail(TAUT_DEVICE_GONE, "dhdGetPosition", last());
+    /* A look may cost a message: every 16 ms, after a pause, and until they are on. */
+    if (device->reads++ % 16 == 0 || !device->renders || now() - device->watched.written > OLDEST)
+        device->renders = !is_off(device);
+    if (!device->renders)
+        return fail(TAUT_DEVICE_NOT_READY, "no force", "its forces are off (its button, or too fast): put them on at the device");
     if (result == DHD_TIMEGUARD)
         return TAUT_DEVICE_NOTHING_NEW;
     if (dhd.GetLinearVelocity(&v[0], &v[1], &v[2], device->id) < 0)
@@ -159,7 +215,7 @@ static int32_t measure(void *opened, taut_device_sample *sample)
 static int32_t render(void *opened, const double wrench[6])
 {
     const struct device *device = opened;
-    /* Back to x towards the user, y right, z up. */
-    int result = dhd.SetForceAndTorqueAndGripperForce(-wrench[1], wrench[0], wrench[2], -wrench[4], wrench[3], wrench[5], 0, device->id);
-    return result < 0 ? fail(TAUT_DEVICE_GONE, "dhdSetForceAndTorqueAndGripperForce", last()) : TAUT_DEVICE_OK;
+    if (push(device, device->renders ? wrench : no_wrench) < 0)
+        return fail(TAUT_DEVICE_GONE, "dhdSetForceAndTorqueAndGripperForce", last());
+    return device->renders ? TAUT_DEVICE_OK : TAUT_DEVICE_NOT_READY;
 }

@@ -206,7 +206,15 @@ fn force_dimension_s_functions_are_called_as_published() {
         max_torque: 0.3,
         turn: Vector3::y() * -2.5,
         near: DOUBLE,
-        modes: &[HANGS, NOT_A_NUMBER, TOO_HOT, UNPLUGGED, NOTHING_NEW],
+        // The last: its force button was pressed.
+        modes: &[
+            HANGS,
+            NOT_A_NUMBER,
+            TOO_HOT,
+            UNPLUGGED,
+            NOTHING_NEW,
+            NOT_CALIBRATED,
+        ],
     });
 }
 
