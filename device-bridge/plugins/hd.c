@@ -109,11 +109,15 @@ static int load(const char *path)
     return complete(&hd.library, missing);
 }
 
-/* The newest error that ends a session; 0 for none. */
+/* The newest error that ends a session; 0 for none. The library keeps them, newest first: a force that was too large may lie on one that ends it. */
 static unsigned failed(void)
 {
-    unsigned code = hd.GetError().code;
-    return code >= HD_FIRST_FORCE_ERROR && code < HD_FORCE_ERROR ? 0 : code;
+    for (int left = 64; left > 0; left--) {
+        unsigned code = hd.GetError().code;
+        if (code < HD_FIRST_FORCE_ERROR || code >= HD_FORCE_ERROR)
+            return code;
+    }
+    return 0;
 }
 
 /* Whether the device asks for its inkwell. What it has found out since is taken over: until then its poses are those of before. */

@@ -14,7 +14,7 @@ typedef struct {
 
 static int enabled;
 static _Atomic int runs;
-static _Atomic unsigned error;
+static _Atomic unsigned error, warning; /* the newer one */
 static _Atomic int calibrated; /* what the inkwell said is taken over */
 static unsigned (*callback)(void *);
 static void *user;
@@ -22,7 +22,9 @@ static pthread_t thread;
 
 HDErrorInfo hdGetError(void)
 {
-    HDErrorInfo last = {atomic_exchange(&error, 0), 0, 0};
+    HDErrorInfo last = {atomic_exchange(&warning, 0), 0, 0};
+    if (!last.code)
+        last.code = atomic_exchange(&error, 0);
     return last;
 }
 const char *hdGetErrorString(unsigned code) { return code == 0x0302 ? "no device found" : "device fault"; }
@@ -48,6 +50,8 @@ void hdEndFrame(unsigned device)
         error = 0x0302;
     if (taut_test_mode == TOO_HOT)
         error = 0x0300;
+    if (error)
+        warning = 0x0201; /* and the force was too large */
 }
 void hdEnable(unsigned what) { enabled |= what == 0x4000; }
 const char *hdGetString(unsigned what) { return what == 0x2501 ? "stand-in Touch" : 0; }
