@@ -11,8 +11,9 @@
  * N m, s, all of them float; a pose is x y z qx qy qz qw; results other than 0 are errors. Axes there: x towards the user, y right, z up. Here: x right,
  * y away, z up.
  *
- * The pose is the physical one, of the handle in the base frame: it stays where the hand is, whatever was indexed. While the offset button is pressed, the
- * power is off or nobody holds the handle, the device renders no force: then it is not ready.
+ * Pose and speed are those of the control point in the environment's frame, as the force is. The physical ones of the handle are in the base's, which is
+ * another one once the handle was turned while it indexed, and it indexes whenever it is let go: a force would point elsewhere. While the offset button is
+ * pressed, the power is off or nobody holds the handle, the device renders no force: then it is not ready.
  *
  * No device was at hand, and not the vendor's library. Where the whole program is gone, the vendor's watchdog is said to let go after 2 s only.
  */
@@ -39,8 +40,8 @@ static struct {
     int (*SetPowerOn)(void *, int);
     int (*GetPowerOn)(void *, int *);
     int (*IsInShiftPosition)(void *, int *);
-    int (*GetPhysicalPosition)(void *, float *);
-    int (*GetPhysicalSpeed)(void *, float *);
+    int (*GetPosition)(void *, float *);
+    int (*GetSpeed)(void *, float *);
     int (*GetButton)(void *, int, int *);
     int (*SetForce)(void *, float *);
     int (*GetErrorCode)(void *);
@@ -77,8 +78,8 @@ static int load(const char *path)
     FIND(SetPowerOn);
     FIND(GetPowerOn);
     FIND(IsInShiftPosition);
-    FIND(GetPhysicalPosition);
-    FIND(GetPhysicalSpeed);
+    FIND(GetPosition);
+    FIND(GetSpeed);
     FIND(GetButton);
     FIND(SetForce);
     FIND(GetErrorCode);
@@ -175,10 +176,10 @@ static int32_t measure(void *opened, taut_device_sample *sample)
     int power = 0, indexes = 1, pressed;
 
     device->renders = false;
-    if (virt.GetPhysicalPosition(device->context, pose))
-        return fail(TAUT_DEVICE_GONE, "virtGetPhysicalPosition", last(device->context));
-    if (virt.GetPhysicalSpeed(device->context, speed))
-        return fail(TAUT_DEVICE_GONE, "virtGetPhysicalSpeed", last(device->context));
+    if (virt.GetPosition(device->context, pose))
+        return fail(TAUT_DEVICE_GONE, "virtGetPosition", last(device->context));
+    if (virt.GetSpeed(device->context, speed))
+        return fail(TAUT_DEVICE_GONE, "virtGetSpeed", last(device->context));
     if (virt.GetPowerOn(device->context, &power) || virt.IsInShiftPosition(device->context, &indexes))
         return fail(TAUT_DEVICE_GONE, "virtGetPowerOn, virtIsInShiftPosition", last(device->context));
     if (!power || indexes)

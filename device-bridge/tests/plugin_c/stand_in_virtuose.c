@@ -56,7 +56,7 @@ int virtGetPowerOn(void *vc, int *on) { return (void)vc, *on = powered && taut_t
 int virtIsInShiftPosition(void *vc, int *indexes) { return (void)vc, *indexes = taut_test_mode == NOTHING_NEW, 0; } /* offset button */
 int virtGetButton(void *vc, int number, int *pressed) { return (void)vc, *pressed = number == 2, 0; }
 /* Turned by 2.5 rad about the axis towards the user. */
-int virtGetPhysicalPosition(void *vc, float *pose)
+int virtGetPosition(void *vc, float *pose)
 {
     long long mode = taut_test_mode;
     (void)vc;
@@ -72,7 +72,7 @@ int virtGetPhysicalPosition(void *vc, float *pose)
     pose[6] = cosf(1.25f);
     return 0;
 }
-int virtGetPhysicalSpeed(void *vc, float *speed)
+int virtGetSpeed(void *vc, float *speed)
 {
     (void)vc;
     memset(speed, 0, 6 * sizeof *speed);
