@@ -126,7 +126,6 @@ fn no_message_to_the_arm_jumps() {
     let faults = Faults {
         modes: &[HANGS, UNPLUGGED],
         ticks: &[1, 3, 10, 30, 100],
-        top: f64::NEG_INFINITY,
         floor: 0.003,
         allowed: 510_000,
         keeps_force: false,

@@ -145,8 +145,19 @@ fn no_write_of_a_plug_in_jumps() {
     let folder = tempfile::tempdir().expect("a folder");
     let library = stand_in(folder.path(), "hand.c", "HAND");
     let inside = Loaded::of(&library);
-    let choice = format!("plugin:{}", library.display());
+    let choice = format!("plugin:{},anchor=workbench", library.display());
     no_write_jumps(&choice, &inside, &BAD_SAMPLES);
+}
+
+#[test]
+fn a_hand_that_rests_before_the_first_tick_is_felt_all_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "HAND");
+    let inside = Loaded::of(&library);
+    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    // A millisecond of its own in each; it rests after some 250.
+    inside.wait("it is read and written", &|| inside.get("writes") > 500);
+    stage.until_felt(&inside);
 }
 
 #[test]

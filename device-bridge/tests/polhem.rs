@@ -56,7 +56,6 @@ fn no_line_to_the_board_jumps() {
     let faults = Faults {
         modes: &[HANGS, NOT_A_NUMBER],
         ticks: &[1, 3, 10, 30, 100],
-        top: f64::NEG_INFINITY,
         floor: 0.003,
         allowed: 510_000,
         keeps_force: false,

@@ -186,7 +186,8 @@ fn a_force_does_not_outlive_the_loop_that_wrote_it_nor_the_bridge() {
 #[test]
 fn no_write_of_a_device_in_python_jumps() {
     let inside = Shared::new();
-    no_write_jumps(&inside.choice, &inside, &BAD_SAMPLES);
+    let choice = format!("{},anchor=workbench", inside.choice);
+    no_write_jumps(&choice, &inside, &BAD_SAMPLES);
 }
 
 #[test]

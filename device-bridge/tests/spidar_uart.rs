@@ -114,7 +114,6 @@ fn no_cycle_of_the_boards_jumps() {
     let faults = Faults {
         modes: &[HANGS, NOT_A_NUMBER],
         ticks: &[1, 3, 10, 30, 100],
-        top: f64::NEG_INFINITY,
         floor: 0.003,
         allowed: 550_000, // digits of eight motors
         keeps_force: false,

@@ -62,7 +62,7 @@ pub struct Stage {
     pub time: u64,
     /// Height of a floor from the highest place so far, m, and its stiffness, N/m.
     pub floor: (f64, f64),
-    /// The highest place so far, m: where the hand began, which it may have left for good before a busy machine makes the first tick, or where it was found.
+    /// The highest place so far, m. Each hand begins at 0, which it may have left for good before a busy machine makes the first tick.
     top: f64,
     /// How many writes a line had made when it was lost.
     lost_at: Option<i64>,
@@ -75,12 +75,12 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// A plug-in, whose hand begins at height 0 and rests 30 mm below.
+    /// A plug-in, whose hand is seen where it is, and not from where the first tick found it: it comes down to rest within a quarter of a second.
     pub fn new(choice: &str, rearm: Rearm) -> Self {
-        Self::with_driver(choice, rearm, 0, 0.0)
+        Self::with_driver(&format!("{choice},anchor=workbench"), rearm, 0)
     }
 
-    fn with_driver(choice: &str, rearm: Rearm, priority: u8, top: f64) -> Self {
+    fn with_driver(choice: &str, rearm: Rearm, priority: u8) -> Self {
         let settings = SafetySettings {
             rearm,
             ..SafetySettings::default()
@@ -92,7 +92,7 @@ impl Stage {
             port,
             time: 1000,
             floor: (-0.02, 200.0),
-            top,
+            top: 0.0,
             lost_at: None,
             rounded: 0,
             ticked: Instant::now(),
@@ -266,9 +266,7 @@ pub struct Faults {
     pub modes: &'static [i64],
     /// For how long, ms.
     pub ticks: &'static [u64],
-    /// Where the hand began, m; a hand in a vice does not move, and is found there.
-    pub top: f64,
-    /// Height of a floor of 1000 N/m from the highest place so far, m. 3 mm above a hand in a vice are 3 N.
+    /// Height of a floor of 1000 N/m from the highest place so far, m. A hand in a vice does not move: 3 mm are 3 N.
     pub floor: f64,
     /// uN from one write to the next: 0.5 N/ms, and rounding.
     pub allowed: i64,
@@ -282,7 +280,6 @@ pub struct Faults {
 pub const BAD_SAMPLES: Faults = Faults {
     modes: &[NOT_A_NUMBER, LONG_QUATERNION, NOT_CALIBRATED, NOTHING_NEW],
     ticks: &[1, 3, 10, 30, 300],
-    top: 0.0,
     floor: -0.005, // a hand of their own goes below it
     allowed: 510_000,
     keeps_force: true,
@@ -297,7 +294,7 @@ const DRIVER_PRIORITY: u8 = 80;
 /// the way back after the driver itself has let go.
 pub fn no_write_jumps(choice: &str, inside: &dyn Inside, faults: &Faults) {
     let allowed = faults.allowed;
-    let mut stage = Stage::with_driver(choice, Rearm::Automatic, DRIVER_PRIORITY, faults.top);
+    let mut stage = Stage::with_driver(choice, Rearm::Automatic, DRIVER_PRIORITY);
     stage.floor = (faults.floor, 1000.0);
     stage.rounded = (allowed - SLEW) / 2;
     for &mode in faults.modes {
