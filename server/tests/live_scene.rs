@@ -485,11 +485,10 @@ fn what_is_kept_is_in_the_file_with_its_comments_and_no_other_change_of_the_file
         &kept.replace("friction = 0.5", "friction = 0.7"),
     );
     let (code, said) = served.taut_edit(&["--keep"]);
-    assert!(
-        code == Some(2) && said.contains("was changed since it was read")
-            || said.contains("nothing"),
-        "{said}"
-    );
+    let is_refused = code == Some(2) && said.contains("was changed since it was read");
+    // On a busy machine it comes to the session that has read the file, and has nothing else.
+    let is_of_next = code == Some(0) && said.contains("kept: ") && served.revision() == 5;
+    assert!(is_refused || is_of_next, "{said}");
     wait_until("the file is followed", || served.revision() == 5);
     assert!(
         served.says(&["not kept in a file, is gone", "plate.opacity"]),
