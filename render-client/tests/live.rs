@@ -182,7 +182,7 @@ impl Server {
             hold: false,
             frames: None,
             out: None,
-            duration: Some(20.0), // so that a failure ends
+            duration: Some(120.0), // so that a failure ends: longer than anything is waited for
             fps: Some(20.0),
             samples: None,
             show: None,
