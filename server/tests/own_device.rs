@@ -9,9 +9,13 @@ use taut_link::{ClientOptions, Role, connect, read_key_file};
 
 use crate::support::{PATIENCE, Running, Workplace, taut, workbench};
 
+/// Where the scene stands, so that its ball begins at the workbench's origin: three times as large as it is, at (0.05, 0, 0.04) m of its own.
+const STANDS: &str = "position = [-0.15, 0.0, -0.12]";
+
 /// The shipped workbench with this device, which nobody needs to arm.
 fn with_device(keys: &str) -> String {
-    let text = workbench();
+    let text = workbench().replacen("position = [0.0, -0.45, 0.25]", STANDS, 1);
+    assert!(text.contains(STANDS));
     let (before, rest) = text.split_once("[device]").expect("a device");
     let (_, after) = rest.split_once("[network]").expect("a network");
     let text = format!("{before}[device]\n{keys}\n[network]{after}");
@@ -55,7 +59,10 @@ fn a_device_in_python_is_felt_by_the_server_itself() {
         env!("CARGO_MANIFEST_DIR"),
         "/python/examples/spring_hand.py"
     );
-    let keys = format!("kind = \"python\"\nfile = \"{file}\"\noptions = \"depth=0.1\"");
+    // It goes down from when it is opened on, and is seen where it is, however late the first tick comes.
+    let keys = format!(
+        "kind = \"python\"\nfile = \"{file}\"\noptions = \"depth=0.1\"\nanchor = \"workbench\""
+    );
     let report = served_until(&keys, |force| force > 0.5);
     let force = report["largest_force_n"].as_f64().expect("a number");
     assert!(force > 0.5 && force <= 5.0, "{report}");
