@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use taut_scene::LengthUnit;
+use taut_scene::{LengthUnit, UpAxis};
 
 use super::values::{
     MOST_VIEWS, film_seconds, hole_edges, output, picture_size, png_file, positive_length,
@@ -113,6 +113,9 @@ pub struct ImportArgs {
     /// Unit of parts whose format names none, STL, OBJ and PLY: m, dm, cm, mm, um, inch (default: m, for parts of a size to be held); glTF is in metres
     #[arg(long, value_name = "UNIT")]
     pub unit: Option<LengthUnit>,
+    /// Which way is up in the parts, y or z: with y, as glTF has it, all are turned so that it is +z of the scene (default: z)
+    #[arg(long, value_name = "AXIS")]
+    pub up: Option<UpAxis>,
     /// Use as few triangles as keep within this distance of the part
     #[arg(long, value_name = "METRES", value_parser = positive_length)]
     pub simplify: Option<f64>,

@@ -13,6 +13,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<ImportReport, Failure> {
         parts: args.parts.clone(),
         folder: args.out.clone(),
         unit: args.unit,
+        up: args.up,
         simplify: args.simplify,
         close_holes: args.close_holes,
         thicken: args.thicken,

@@ -10,6 +10,7 @@ mod hand_path;
 mod holes;
 mod manifold;
 mod orientation;
+mod placing;
 mod repair;
 mod report;
 mod scene_text;
@@ -21,9 +22,10 @@ mod weld;
 use std::path::{Path, PathBuf};
 
 use god_object::Mesh;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 pub use holes::MAX_HOLE_EDGES;
+pub use placing::UpAxis;
 pub use report::{Finding, ImportReport, PartReport};
 pub use unit::LengthUnit;
 
@@ -36,12 +38,11 @@ use crate::scene::{GOD_OBJECT_NAME, RESERVED_NAMES, Scene};
 use crate::simplify::simplify;
 use folder::NewFolder;
 use hand_path::hand_path;
+use placing::{move_to_origin, note_up, upright};
 use repair::{Repaired, Wishes, is_single, repair};
 use report::Places;
 use scene_text::{HAND_SECTION, Placed, around, clear_above, scene_text, sphere_radius};
 
-/// Parts whose middle is farther from the origin than so many of their diagonals are moved there together.
-const FAR_AWAY: f64 = 2.0;
 /// Name of the scene file in the folder.
 const SCENE_FILE: &str = "scene.toml";
 /// Name of the path of the simulated hand there.
@@ -56,6 +57,8 @@ pub struct ImportRequest {
     pub folder: PathBuf,
     /// Unit of files that name none of their own: STL, OBJ, PLY.
     pub unit: Option<LengthUnit>,
+    /// Which way is up in the files; `None` takes them as they are, and says so of glTF.
+    pub up: Option<UpAxis>,
     /// Most distance by which a simplified mesh may differ, m.
     pub simplify: Option<f64>,
     /// Most edges of a hole that is closed; `None` closes small ones, and with `thicken` none.
@@ -94,6 +97,7 @@ pub fn import_unless(
     }
     FileError::unless_empty(problems)?;
     let mut notes = Vec::new();
+    note_up(request, &mut notes);
     move_to_origin(&mut parts, &mut notes);
     let placed: Vec<Placed> = parts
         .iter()
@@ -212,7 +216,7 @@ fn part(
     );
     let crossing = crossing::crossing(&mesh);
     drop(progress);
-    let raw = raw_of(&mesh);
+    let raw = upright(raw_of(&mesh), request.up);
     let mut report = PartReport {
         file: path.display().to_string(),
         body: body.to_owned(),
@@ -249,25 +253,6 @@ fn raw_of(mesh: &Mesh) -> RawMesh {
         vertices: mesh.vertices().to_vec(),
         triangles: mesh.triangles().to_vec(),
     }
-}
-
-/// Parts keep their places to each other; only when all are far away, all are moved by the same way.
-fn move_to_origin(parts: &mut [(PartReport, RawMesh)], notes: &mut Vec<String>) {
-    let boxes = parts.iter().filter_map(|(_, mesh)| mesh.bounds());
-    let Some((low, high)) = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1))) else {
-        return;
-    };
-    let way: Vector3<f64> = -nalgebra::center(&low, &high).coords;
-    if way.norm() <= FAR_AWAY * (high - low).norm() {
-        return;
-    }
-    for vertex in parts.iter_mut().flat_map(|(_, mesh)| &mut mesh.vertices) {
-        *vertex += way;
-    }
-    notes.push(format!(
-        "the parts lie far from the origin of their files; all were moved by the same {}, and places above are those before",
-        place_text(&Point3::from(way))
-    ));
 }
 
 /// Writes the scene with the held body where its file puts it or, where it would touch the others, above them.

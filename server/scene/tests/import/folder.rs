@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use god_object::nalgebra::Point3;
 use god_object::spatial::{Pose, linear};
 use god_object::{Coupling, GodObject};
-use taut_scene::{ImportRequest, Scene, check, import, import_unless};
+use taut_scene::{ImportRequest, Scene, UpAxis, check, import, import_unless};
 
 use super::solids::{Soup, moved, part, scaled};
-use super::write::{ply, stl};
+use super::write::{glb, ply, stl};
 
 struct Parts(tempfile::TempDir);
 
@@ -231,6 +232,37 @@ fn names_that_would_be_the_same_are_told_apart() {
     let files: Vec<&str> = report.parts.iter().map(|p| p.mesh_file.as_str()).collect();
     let written = ["a-b.ply", "god-object-2.ply", "A-B-2.ply", "coupling-2.ply"];
     assert_eq!(files, written);
+}
+
+/// From 3 to 7 cm along the y axis of the file.
+#[test]
+fn what_is_up_in_the_files_is_up_in_the_scene_where_that_is_said() {
+    let parts = Parts::new(&[]);
+    let file = glb(&moved(part(), [0.0, 0.05, 0.0]));
+    std::fs::write(parts.path("a.glb"), file).unwrap();
+    let lying = [[-0.03, 0.03, -0.01], [0.03, 0.07, 0.01]];
+    let upright = [[-0.03, -0.01, 0.03], [0.03, 0.01, 0.07]];
+    for (out, up, expected) in [
+        ("unsaid", None, lying),
+        ("z", Some(UpAxis::Z), lying),
+        ("y", Some(UpAxis::Y), upright),
+    ] {
+        let request = ImportRequest {
+            up,
+            folder: parts.path(out),
+            ..parts.request(&["a.glb"])
+        };
+        let report = import(&request).unwrap();
+        let scene = Scene::load(Path::new(&report.scene)).unwrap();
+        let (low, high) = scene.build().unwrap().bodies[0].mesh.bounds().unwrap();
+        for (corner, meant) in [low, high].into_iter().zip(expected) {
+            let off = (corner - Point3::from(meant)).amax();
+            assert!(off < 1e-7, "{out}: {corner}");
+        }
+        assert!(report.parts[0].mesh.volume_m3 > 0.0, "{report}");
+        let hint = report.notes.iter().any(|note| note.contains("--up y"));
+        assert_eq!(hint, up.is_none(), "{report}");
+    }
 }
 
 #[test]
