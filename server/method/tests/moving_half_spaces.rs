@@ -145,6 +145,32 @@ fn a_floor_that_tilts_and_slides_far_from_its_origin_carries_no_error() {
     }
 }
 
+/// The floor tilts by 20 degrees in one update: once the ball has made room, half a millimetre is lacking. A box goes its way 100 m off meanwhile.
+#[test]
+fn a_floor_gets_to_its_target_however_far_others_go_in_the_update() {
+    for way in [0.0, 10.0] {
+        let mut world = (*world(Held::Sphere)).clone();
+        world.obstacles[0].pose = Pose::translation(0.1, 0.0, 0.0);
+        let far = Vector3::new(100.0, 0.0, 0.0);
+        world
+            .obstacles
+            .push(box_obstacle("far", Vector3::repeat(0.1), far));
+        let hand = Pose::translation(0.0, 0.0, 0.03);
+        let settings = Settings::for_size(0.02);
+        let world = Arc::new(world);
+        let mut god_object = GodObject::new(world.clone(), settings, hand).expect("a free start");
+        let tilt = Pose::rotation(Vector3::y() * 20_f64.to_radians());
+        let floor = world.obstacles[0].pose * tilt;
+        assert!(god_object.move_obstacle(0, &floor));
+        assert!(god_object.move_obstacle(1, &Pose::translation(far.x, way, 0.0)));
+        let report = god_object.step(&hand, None);
+        assert_eq!(report.obstacles_blocked, 0, "beside one that goes {way} m");
+        assert_eq!(place(&god_object), floor);
+        let height = Held::Sphere.height(god_object.pose(), &floor);
+        assert!(height >= settings.minimum_gap, "{height}");
+    }
+}
+
 #[test]
 fn a_floor_that_slides_along_itself_moves_nothing() {
     for held in Held::ALL {

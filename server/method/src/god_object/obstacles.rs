@@ -89,11 +89,11 @@ impl GodObject {
                 .work_budget
                 .is_none_or(|budget| report.work.nominal_us() < budget);
             // An obstacle that lacks less than a motion has arrived: to look for room for so little costs a search each time.
-            let arrived = self.longest_way_left() <= tolerance;
-            if arrived || share < LEAST_SHARE || !budget_left {
+            let left = self.longest_way_left();
+            if left <= tolerance || share < LEAST_SHARE || !budget_left {
                 break;
             }
-            let enough = (LEAST_PROGRESS * share * asked).max(tolerance);
+            let enough = (LEAST_PROGRESS * share * left).max(tolerance);
             match self.make_room(share, report) {
                 Some(made) if made + gone > enough => share = (share / SQUEEZED_SHARE).min(1.0),
                 // No room; or none is needed at the end of a long turn, but on the way there.
