@@ -101,8 +101,8 @@ pub struct Settings {
     pub activation_distance: f64,
     /// Most that look-ahead adds to the activation distance, m.
     pub look_ahead_limit: f64,
-    /// Pairs of triangles, and of their features, that one collection may look at. It looks nearest first: one that would cost more reaches less
-    /// far. Late updates must not make later ones still later.
+    /// Pairs of triangles, and of their features, that one collection may look at; up to twice as many where several obstacles need more than in the one
+    /// before. It looks nearest first: one that would cost more reaches less far. Late updates must not make later ones still later.
     pub look_ahead_pairs: u64,
     /// A motion whose fastest point covers less than this is none, m; and a constraint that a motion violates by less than a thousandth of it is
     /// left out of a set whose rows are chosen.
