@@ -286,12 +286,12 @@ fn a_blade_that_turns_takes_the_body_along() {
     assert_eq!(blocked, 0);
 }
 
-const CLEARANCE: f64 = 1e-4;
+pub(crate) const CLEARANCE: f64 = 1e-4;
 /// Of a jaw from the middle of the slot, m.
 const JAW: f64 = 0.02 + CLEARANCE + 0.005;
 
 /// Two jaws in one piece, 0.1 mm from the body on either side.
-fn slot() -> Arc<World> {
+pub(crate) fn slot() -> Arc<World> {
     let one = box_obstacle("slot", Vector3::new(0.005, 0.05, 0.05), Vector3::zeros());
     let (corners, faces) = (one.mesh.vertices(), one.mesh.triangles());
     let vertices = [-JAW, JAW]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::moving_obstacles::overlaps;
+use crate::moving_obstacles::{CLEARANCE, overlaps, slot};
 use crate::support::{box_body, box_obstacle};
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::{GodObject, Mesh, Obstacle, Pose, Settings, World};
@@ -119,4 +119,34 @@ fn a_door_that_comes_near_carries_no_body_behind_a_fence() {
     let hand = Pose::translation(0.1, 0.01105, 0.0);
     let off = off_after(&world, [&hand, &hand], &[45.0, 115.0]);
     assert!(off < 1e-4, "{off}");
+}
+
+/// The slot goes a hundred clearances in each update, and a smooth table, on which the hand presses the body, slides across.
+#[test]
+fn a_table_that_slides_by_lets_a_body_go_along_with_its_slot() {
+    for step in [0.01, -0.01] {
+        let mut world = World::clone(&slot());
+        let (half, center) = (Vector3::new(0.5, 0.5, 5e-3), Vector3::z() * -0.01502);
+        world.obstacles.push(box_obstacle("table", half, center));
+        let world = Arc::new(world);
+        let [slot, table] = [0, 1].map(|index| world.obstacles[index].pose);
+        let settings = Settings::for_size(0.04);
+        let mut god_object =
+            GodObject::new(world.clone(), settings, Pose::identity()).expect("a free start");
+        let pressed = Pose::translation(0.0, 0.0, -1e-3);
+        for _ in 0..20 {
+            god_object.step(&pressed, None);
+        }
+        for update in 1..=20 {
+            let u = f64::from(update);
+            let along = Pose::translation(step * u, 0.0, 0.0);
+            god_object.move_obstacle(0, &(along * slot));
+            god_object.move_obstacle(1, &(Pose::translation(0.0, 1e-3 * u, 0.0) * table));
+            let report = god_object.step(&(along * pressed), None);
+            assert_eq!(report.obstacles_blocked, 0, "in update {update}");
+            assert!(!overlaps(&world, &god_object));
+            let aside = god_object.pose().translation.x - step * u;
+            assert!(aside.abs() <= CLEARANCE, "left the slot: {aside}");
+        }
+    }
 }

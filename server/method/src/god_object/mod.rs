@@ -24,6 +24,7 @@
 //! | `search.rs`     | rows that are missing, where surfaces conform                                     |
 //! | `look_ahead.rs` | how far a published set looks ahead, and what that may cost                       |
 //! | `obstacles.rs`  | obstacles that move, and the body out of their way                                |
+//! | `going_along.rs`| the body goes along with one of them, as one rigid body                           |
 //! | `placed_obstacle.rs` | where an obstacle is on its way                                              |
 //! | `report.rs`     | what one update did                                                               |
 
@@ -32,6 +33,7 @@ mod carry;
 mod collection;
 mod free_motion;
 mod generation;
+mod going_along;
 mod look_ahead;
 mod obstacles;
 mod placed_obstacle;
