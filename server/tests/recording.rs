@@ -296,9 +296,19 @@ fn a_recording_of_a_scene_in_the_current_folder_is_replayed_from_any_other() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     let made = place.path().join("made");
-    let output = taut(&["replay", "--recording", &made.to_string_lossy()]);
+    let made = made.to_string_lossy();
+    let output = taut(&["replay", "--recording", &made]);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
+    // What it is computed from is not written over.
+    let way = place.path().join("way.csv");
+    for command in [vec!["replay", "--recording", &made], vec!["export", &made]] {
+        let out = way.to_string_lossy();
+        let output = taut(&[&command[..], &["--out", &out]].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains("it is read for this answer"), "{said}");
+        assert!(std::fs::read_to_string(&way).is_ok_and(|text| text == WAY));
+    }
 }
 
 #[cfg(unix)]

@@ -86,13 +86,15 @@ pub(crate) fn replay<'py>(
     table(py, numbers, REPLAY_COLUMNS.split(',').count())
 }
 
-/// All columns of all rows; the file, if one is named, gets the bytes that `taut replay` writes, and is neither the scene nor the trace. An
-/// exception of a signal's handler ends it, and nothing is written.
+/// All columns of all rows; the file, if one is named, gets the bytes that `taut replay` writes, and is neither the trace, nor the scene, nor
+/// a file that this names. An exception of a signal's handler ends it, and nothing is written.
 fn rows(scene: &str, trace: &Path, out: Option<&Path>) -> PyResult<Vec<f64>> {
-    let inputs = [Path::new(scene), trace];
-    let built = Scene::named_or_file(scene)
-        .and_then(|scene| scene.build())
-        .map_err(bad_file)?;
+    let named = [Path::new(scene), trace];
+    let scene = Scene::named_or_file(scene).map_err(bad_file)?;
+    let built = scene.build().map_err(bad_file)?;
+    let files = scene.files().map_err(bad_file)?;
+    let of_scene = files.iter().map(|(_, found)| found.as_path());
+    let inputs: Vec<&Path> = named.into_iter().chain(of_scene).collect();
     let trace = DeviceTrace::load(trace).map_err(bad_file)?;
     let mut runner = Runner::of_scene(built).map_err(|error| bad(error.to_string()))?;
     let cannot_write = |error: std::io::Error| {

@@ -81,6 +81,20 @@ class Replay(unittest.TestCase):
             self.assertEqual(trace.read_bytes(), before)
             self.assertEqual(len(list(pathlib.Path(name).iterdir())), 2)
 
+    def test_an_answer_is_not_written_over_what_its_scene_names(self):
+        with tempfile.TemporaryDirectory() as name:
+            scene, way, hand = (pathlib.Path(name) / file for file in ("scene.toml", "way.csv", "hand.csv"))
+            scene.write_text(
+                'name = "x"\n[god_object]\nshape = { sphere = { radius = 0.01 } }\nmass = 1.0\npose = { position = [0.0, 0.0, 0.1] }\n'
+                '[[obstacle]]\nname = "plate"\nshape = { box = { half_extents = [0.1, 0.1, 0.01] } }\nmotion = { trace = "way.csv" }\n'
+            )
+            for trace, height in (way, 0.0), (hand, 0.1):
+                trace.write_text(f"t,x,y,z,qw,qx,qy,qz\n0,0,0,{height},1,0,0,0\n1,0,0,{height},1,0,0,0\n")
+            before = way.read_bytes()
+            with self.assertRaisesRegex(taut.TautError, "it is read for this answer"):
+                taut.replay(str(scene), hand, way)
+            self.assertEqual(way.read_bytes(), before)
+
     def test_a_replay_can_be_interrupted_and_then_writes_nothing(self):
         class Interrupted(Exception):
             pass

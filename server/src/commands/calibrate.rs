@@ -53,7 +53,7 @@ fn write_all(
         let gpu = Gpu::open_with(choice).map_err(failure)?;
         for (name, bytes) in calibration.pictures(gpu).map_err(failure)? {
             let path = folder.join(name);
-            write(&path, &bytes)?;
+            write(&path, &bytes, &[])?;
             written.push(path.display().to_string());
         }
     }

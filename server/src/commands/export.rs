@@ -1,12 +1,14 @@
 //! `taut export`: a recorded session as an MCAP file. The work is `taut_recording::export_mcap`; what it needs of the scene is found here.
 
+use std::path::{Path, PathBuf};
+
 use taut_recording::{
     ExportReport, MovingObstacle, Recording, RecordingError, SceneFrames, export_mcap,
 };
 use taut_scene::{BuiltScene, FinishedFile};
 
 use crate::cli::ExportArgs;
-use crate::commands::replay::recorded::scene_of;
+use crate::commands::replay::recorded::{files_of, scene_of};
 use crate::shared::failure::Failure;
 use crate::shared::shutdown::Shutdown;
 
@@ -22,7 +24,13 @@ pub(super) fn run(args: &ExportArgs) -> Result<ExportReport, Failure> {
             args.out.display()
         ))
     };
-    let mut file = FinishedFile::create(&args.out, &[&args.recording]).map_err(cannot_write)?;
+    let files = files_of(&recording);
+    let of_scene = files.iter().map(PathBuf::as_path);
+    let inputs: Vec<&Path> = [args.recording.as_path()]
+        .into_iter()
+        .chain(of_scene)
+        .collect();
+    let mut file = FinishedFile::create(&args.out, &inputs).map_err(cannot_write)?;
     let report =
         export_mcap(&recording, scene, &mut file, || interrupted.is_asked()).map_err(|error| {
             match error {

@@ -36,13 +36,15 @@ pub(super) fn run(args: &PreviewArgs) -> Result<Vec<String>, Failure> {
     let size = args.size.unwrap_or(PREVIEW_SIZE);
     let usual = args.film.map_or(1, |_| FILM_VIEWS);
     let preview = preview(&args.scene, &choice, size, args.orbit.unwrap_or(usual))?;
+    let files = inputs(&args.scene)?;
+    let inputs: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     let mut written = Vec::new();
     for (view, path) in (0..).zip(&paths) {
         let bytes = match args.film {
             Some(seconds) => preview.film(seconds),
             None => preview.png(view),
         };
-        write(path, &bytes.map_err(failure)?)?;
+        write(path, &bytes.map_err(failure)?, &inputs)?;
         written.push(path.display().to_string());
     }
     Ok(written)
@@ -53,7 +55,7 @@ pub(super) fn beside(scene: &str) -> Result<String, String> {
     let path = Path::new(scene).with_file_name(PICTURE_FILE);
     preview(scene, &GpuChoice::default(), PREVIEW_SIZE, 1)
         .and_then(|preview| preview.png(0).map_err(failure))
-        .and_then(|bytes| write(&path, &bytes))
+        .and_then(|bytes| write(&path, &bytes, &[]))
         .map_err(|error| error.to_string())?;
     Ok(path.display().to_string())
 }
@@ -93,6 +95,15 @@ fn preview(
     Preview::new(gpu, &described(&built)?, size, views).map_err(failure)
 }
 
+/// The scene file, and the files that it names.
+fn inputs(scene: &str) -> Result<Vec<PathBuf>, Failure> {
+    let files = Scene::named_or_file(scene)?.files()?;
+    let named = files.into_iter().map(|(_, found)| found);
+    // A shipped scene's name may be that of a folder here, which is not read.
+    let own = Some(PathBuf::from(scene)).filter(|path| path.is_file());
+    Ok(own.into_iter().chain(named).collect())
+}
+
 fn described(built: &BuiltScene) -> Result<PreviewScene, Failure> {
     let bodies = bodies(built).map(|body| body.map(|(body, mesh)| (body, Arc::new(mesh))));
     // The god-object is the first; in the hand a plane is a plate, as in scenery.
@@ -117,9 +128,9 @@ pub(super) fn failure(error: RenderError) -> Failure {
     }
 }
 
-/// The whole file, or none.
-pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let written = FinishedFile::create(path, &[]).and_then(|mut file| {
+/// The whole file, or none; it replaces none of the `inputs`.
+pub(super) fn write(path: &Path, bytes: &[u8], inputs: &[&Path]) -> Result<(), Failure> {
+    let written = FinishedFile::create(path, inputs).and_then(|mut file| {
         file.write_all(bytes)?;
         file.finish()
     });
@@ -224,6 +235,26 @@ mod tests {
             red > 500 && green > 500 && blue > 500,
             "{red} {green} {blue}"
         );
+    }
+
+    #[test]
+    fn a_picture_replaces_no_file_that_its_scene_names() {
+        let folder = tempfile::tempdir().expect("no temporary directory");
+        let path = |name: &str| folder.path().join(name);
+        let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { sphere = { radius = 0.01 } }\n\
+            [[obstacle]]\nname = \"o\"\nshape = { box = { half_extents = [0.01, 0.01, 0.01] } }\n\
+            surface = { texture = { height_map = { file = \"a.png\", tile = 0.05, amplitude = 2e-4 } } }\n";
+        assert!(fs::write(path("a.png"), "precious").is_ok());
+        assert!(fs::write(path("scene.png"), text).is_ok());
+        let files = inputs(&path("scene.png").display().to_string()).expect("it is a scene");
+        let inputs: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+        for name in ["a.png", "scene.png"] {
+            let refused = write(&path(name), b"picture", &inputs);
+            let said = refused.expect_err("it is read").to_string();
+            assert!(said.contains("it is read for this answer"), "{said}");
+        }
+        assert!(fs::read(path("a.png")).is_ok_and(|bytes| bytes == b"precious"));
+        assert!(write(&path("b.png"), b"picture", &inputs).is_ok());
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! constraint sets. Nothing else goes into either, so both must come to the same bits, on any machine and in any build of the same method.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use god_object::spatial::{Pose, Vector6};
@@ -13,7 +13,7 @@ use taut_recording::{
     ForceRecord, RecordReader, Recording, SceneOrigin, UpdateRecord, identity_of,
 };
 use taut_scene::{
-    BuiltMotion, BuiltScene, FinishedFile, ReplayRow, ReplayWriter, Scene, SceneSource,
+    BuiltMotion, BuiltScene, FileError, FinishedFile, ReplayRow, ReplayWriter, Scene, SceneSource,
 };
 
 use crate::loops::realtime::thread_cpu_time;
@@ -40,9 +40,12 @@ pub fn run(
             path.display()
         ))
     };
+    let files = files_of(&recording);
+    let of_scene = files.iter().map(PathBuf::as_path);
+    let inputs: Vec<&Path> = [directory].into_iter().chain(of_scene).collect();
     let mut writer = match out {
         Some(path) => Some(
-            FinishedFile::create(path, &[directory])
+            FinishedFile::create(path, &inputs)
                 .and_then(|file| ReplayWriter::new(file, timings))
                 .map_err(|error| cannot_write(path, error))?,
         ),
@@ -70,8 +73,29 @@ pub fn run(
     Ok(session.report(&recording))
 }
 
+/// The files that the scene of the recording names, where it can be read: what is made of them replaces none.
+pub(in crate::commands) fn files_of(recording: &Recording) -> Vec<PathBuf> {
+    let files = described(recording).and_then(|scene| scene.files());
+    let found = files.into_iter().flatten().map(|(_, found)| found);
+    found.collect()
+}
+
 /// The scene of the recording, with the bodies and settings that it had then.
 pub(in crate::commands) fn scene_of(recording: &Recording) -> Result<BuiltScene, Failure> {
+    let manifest = recording.manifest();
+    let built = described(recording)?.build()?;
+    if identity_of(&built.world, &built.settings, &built.start) != manifest.identity {
+        return Err(Failure::BadInput(format!(
+            "{}: gives other bodies or settings than those of the session ({}): a mesh has changed since, or this program has other defaults; use the files and the program of then",
+            recording.scene_path().display(),
+            manifest.program
+        )));
+    }
+    Ok(built)
+}
+
+/// The same as it was written, without its meshes.
+fn described(recording: &Recording) -> Result<Scene, FileError> {
     let manifest = recording.manifest();
     let source = SceneSource {
         text: recording.scene().into(),
@@ -82,14 +106,7 @@ pub(in crate::commands) fn scene_of(recording: &Recording) -> Result<BuiltScene,
         overrides: manifest.overrides.clone(),
     };
     let file = recording.scene_path().display().to_string();
-    let built = Scene::from_source(&file, &source)?.build()?;
-    if identity_of(&built.world, &built.settings, &built.start) != manifest.identity {
-        return Err(Failure::BadInput(format!(
-            "{file}: gives other bodies or settings than those of the session ({}): a mesh has changed since, or this program has other defaults; use the files and the program of then",
-            manifest.program
-        )));
-    }
-    Ok(built)
+    Scene::from_source(&file, &source)
 }
 
 /// The two loops of the method, fed with what they were fed with then.
