@@ -26,13 +26,14 @@ except ImportError as error:
 
 POSE = ["x", "y", "z", "qw", "qx", "qy", "qz"]
 FEATURES = {
-    # Name of the feature: file, its columns, and what they are called in the dataset.
-    "observation.state": ("updates", ["sx", "sy", "sz", "sqw", "sqx", "sqy", "sqz"], POSE),
-    "observation.velocity": ("haptics", ["vx", "vy", "vz", "wx", "wy", "wz"], None),
-    "observation.wrench": ("haptics", ["fx", "fy", "fz", "tx", "ty", "tz"], None),
-    "action": ("haptics", POSE, None),
+    # Name of the feature: file, the column with the time at which it was so, its columns, and what they are called in the dataset.
+    "observation.state": ("updates", "published_ns", ["sx", "sy", "sz", "sqw", "sqx", "sqy", "sqz"], POSE),
+    "observation.velocity": ("haptics", "t_ns", ["vx", "vy", "vz", "wx", "wy", "wz"], None),
+    "observation.wrench": ("haptics", "tick_ns", ["fx", "fy", "fz", "tx", "ty", "tz"], None),
+    "action": ("haptics", "t_ns", POSE, None),
 }
-TIMES = {"haptics": "t_ns", "updates": "published_ns"}
+TIMES = {"haptics": ["t_ns", "tick_ns"], "updates": ["published_ns"]}
+"""Of each file: when the device was there, which is one time for all ticks that read one sample, and the tick."""
 COUNTERS = {"timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64", "task_index": "int64"}
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 PATTERN = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
@@ -97,11 +98,13 @@ def _manifest(session):
 def _table(session, name):
     """Times (ns) and the columns of a file, by name. A last line that was cut off is none."""
     path = session / f"{name}.csv"
-    wanted = {column: pa.float64() for file, columns, _ in FEATURES.values() if file == name for column in columns}
-    wanted |= {TIMES[name]: pa.int64()} | ({"faulty": pa.uint8()} if name == "haptics" else {})
+    wanted = {column: pa.float64() for file, _, columns, _ in FEATURES.values() if file == name for column in columns}
+    wanted |= {time: pa.int64() for time in TIMES[name]} | ({"faulty": pa.uint8()} if name == "haptics" else {})
     try:
         text = pa.memory_map(str(path)).read_buffer()
         end = _whole_lines(text)
+        if b"tick_ns" not in text.slice(0, min(end, 4096)).to_pybytes().split(b"\n")[0]:
+            wanted.pop("tick_ns", None)  # recordings of before have no time of ticks
         options = pa.csv.ConvertOptions(column_types=wanted, include_columns=list(wanted))
         table = pa.csv.read_csv(pa.BufferReader(text.slice(0, end)), convert_options=options)
         columns = {column: table[column].to_numpy() for column in wanted}
@@ -109,7 +112,9 @@ def _table(session, name):
         raise TautError(f"{path}: cannot be read ({error}); a file that is damaged elsewhere than at its end is exported by `taut export`") from error
     if not all(np.isfinite(values).all() for values in columns.values()):
         raise TautError(f"{path}: has numbers that are not finite")
-    if len(columns[TIMES[name]]) == 0 or (np.diff(columns[TIMES[name]]) < 0).any():
+    if name == "haptics":
+        columns.setdefault("tick_ns", columns["t_ns"])
+    if any(len(columns[time]) == 0 or (np.diff(columns[time]) < 0).any() for time in TIMES[name]):
         raise TautError(f"{path}: has no records, or times that run back")
     return columns, text.size > end
 
@@ -131,15 +136,15 @@ def _frames(session, fps, written):
     for name in TIMES:
         tables[name], cut_off = _table(session, name)
         said += [f"{session / name}.csv: its last line is cut off, and was left out"] if cut_off else []
-        found = len(tables[name][TIMES[name]]) + cut_off
+        found = len(tables[name][TIMES[name][0]]) + cut_off
         if found != written.get(name, found):
             said.append(f"{session / name}.csv: ends after {found} records, but the session wrote {written[name]}; what is missing was left out")
     good = tables["haptics"].pop("faulty") == 0
     if not good.all():
         said.append(f"{session}: {np.count_nonzero(~good)} ticks had no good pose, and were left out")
         tables["haptics"] = {column: values[good] for column, values in tables["haptics"].items()}
-    times = {name: tables[name][TIMES[name]] for name in TIMES}
-    if not len(times["haptics"]):
+    times = {time: tables[name][time] for name in TIMES for time in TIMES[name]}
+    if not len(times["t_ns"]):
         raise TautError(f"{session}: no tick had a good pose")
     begin = max(time[0] for time in times.values())
     span = min(time[-1] for time in times.values()) - begin
@@ -150,12 +155,12 @@ def _frames(session, fps, written):
         raise TautError(f"{session}: {count} frames are more than {MOST_FRAMES}; the times are damaged, or take fewer frames a second")
     frames = begin + np.arange(count) * 1_000_000_000 // fps
     newest = {name: np.searchsorted(time, frames, side="right") - 1 for name, time in times.items()}
-    old = sum(frames - times["haptics"][newest["haptics"]] > 1_000_000_000 // fps)
+    old = sum(frames - times["t_ns"][newest["t_ns"]] > 1_000_000_000 // fps)
     if old:
         said.append(f"{session}: at {old} frames the device's newest sample is older than a frame")
     features = {
-        key: np.stack([tables[name][column][newest[name]] for column in columns], axis=1).astype("float32")
-        for key, (name, columns, _) in FEATURES.items()
+        key: np.stack([tables[name][column][newest[time]] for column in columns], axis=1).astype("float32")
+        for key, (name, time, columns, _) in FEATURES.items()
     }
     return features, said
 
@@ -173,7 +178,7 @@ def _stats(columns):
 
 def _write(out, tables, tasks, episodes, fps):
     vectors = {
-        key: {"dtype": "float32", "shape": [len(columns)], "names": names or columns} for key, (_, columns, names) in FEATURES.items()
+        key: {"dtype": "float32", "shape": [len(columns)], "names": names or columns} for key, (_, _, columns, names) in FEATURES.items()
     }
     features = vectors | {key: {"dtype": dtype, "shape": [1], "names": None} for key, dtype in COUNTERS.items()}
     (out / "data/chunk-000").mkdir(parents=True, exist_ok=True)

@@ -78,13 +78,13 @@ class LeRobot(unittest.TestCase):
             self.assertEqual({frame["task_index"] for frame in frames}, {number})
             haptics, updates = rows(session / "haptics.csv"), rows(session / "updates.csv")
             haptics = [row for row in haptics if row["faulty"] == "0"]
-            begin = max(int(haptics[0]["t_ns"]), int(updates[0]["published_ns"]))
+            begin = max(int(haptics[0]["t_ns"]), int(haptics[0]["tick_ns"]), int(updates[0]["published_ns"]))
             for frame in frames[:: len(frames) // 7]:
                 self.assertAlmostEqual(frame["timestamp"], frame["frame_index"] / FPS, places=5)
                 when = begin + frame["frame_index"] * 10**9 // FPS
                 for key, records, time, columns in [
                     ("action", haptics, "t_ns", "x y z qw qx qy qz"),
-                    ("observation.wrench", haptics, "t_ns", "fx fy fz tx ty tz"),
+                    ("observation.wrench", haptics, "tick_ns", "fx fy fz tx ty tz"),
                     ("observation.velocity", haptics, "t_ns", "vx vy vz wx wy wz"),
                     ("observation.state", updates, "published_ns", "sx sy sz sqw sqx sqy sqz"),
                 ]:
@@ -98,6 +98,32 @@ class LeRobot(unittest.TestCase):
         tasks = pandas.read_parquet(out / "meta/tasks.parquet")
         self.assertEqual(tasks.index.name, "task")
         self.assertEqual(tasks.loc["moving-plate"].task_index, 1)
+
+    def test_a_force_is_that_of_its_time_also_where_the_device_is_silent(self):
+        silent, out = self.place / "silent", self.place / "of-silent"
+        shutil.copytree(self.sessions[0], silent)
+        haptics = rows(silent / "haptics.csv")
+        quarter = len(haptics) // 4
+        for row in haptics[quarter : 3 * quarter]:
+            row["t_ns"] = haptics[quarter]["t_ns"]
+        with open(silent / "haptics.csv", "w", newline="") as file:
+            writer = csv.DictWriter(file, haptics[0], lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(haptics)
+        taut.lerobot.export([silent], out, FPS)
+        table = pyarrow.parquet.read_table(out / "data/chunk-000/file-000.parquet")
+        good = [row for row in haptics if row["faulty"] == "0"]
+        updates = rows(silent / "updates.csv")
+        begin = max(int(good[0]["t_ns"]), int(good[0]["tick_ns"]), int(updates[0]["published_ns"]))
+        differ = 0
+        for frame in table.to_pylist():
+            when = begin + frame["frame_index"] * 10**9 // FPS
+            felt, later = (
+                np.array(newest(good, time, "fx fy fz tx ty tz".split(), when), dtype="float32") for time in ("tick_ns", "t_ns")
+            )
+            np.testing.assert_array_equal(np.array(frame["observation.wrench"], dtype="float32"), felt)
+            differ += (felt != later).any()
+        self.assertGreater(differ, 0, "the force changes meanwhile")
 
     def test_half_a_session_is_exported_and_said_not_to_be_whole(self):
         killed = self.place / "killed"
