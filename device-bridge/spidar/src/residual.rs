@@ -39,8 +39,6 @@ pub struct Suspect {
     pub string: usize,
     /// By how much it measures too long, m.
     pub error: f64,
-    /// Share of the residuals' square sum that this error explains, 0 to 1.
-    pub explained: f64,
     /// Whether it stands out from all others; if not, move the grip.
     pub certain: bool,
 }
@@ -134,12 +132,10 @@ impl ResidualMonitor {
             }
         }
         let (string, explained) = best?;
-        let energy = self.energy.max(f64::MIN_POSITIVE);
         let (left, left_by_next) = (self.energy - explained, self.energy - second);
         Some(Suspect {
             string,
             error: -self.sums[string] / self.weights[string],
-            explained: explained / energy,
             certain: explained >= EXPLAINED * self.energy
                 && left <= CLEARER_THAN_NEXT * left_by_next
                 && left_by_next >= NEXT_LEAVES * self.energy,

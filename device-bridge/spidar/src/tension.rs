@@ -157,12 +157,6 @@ impl TensionSolver {
         self.motors[string] = state;
     }
 
-    /// What each motor does.
-    #[must_use]
-    pub fn motors(&self) -> &[MotorState; STRINGS] {
-        &self.motors
-    }
-
     /// Tensions for a wrench (N, N m about the grip's centre, frame axes) at the pose of `strings`.
     pub fn distribute(&mut self, strings: &StringMatrix, wrench: &Vector6<f64>) -> TensionAnswer {
         let rows = strings.scaled_rows(self.arm);

@@ -32,8 +32,6 @@ pub struct Extreme {
 pub struct Capability {
     /// Whether all strings can be taut without any wrench.
     pub pretension: bool,
-    /// The force (N) that is left over where they cannot.
-    pub stray_force: f64,
     /// Ratio of the largest to the smallest singular value of W, moments over G.
     pub condition: f64,
     /// Pure force, the weakest of the six axis directions.
@@ -98,11 +96,8 @@ pub fn capability(geometry: &Geometry, frame_from_grip: &Pose) -> Capability {
     let probe = Probe::new(geometry, frame_from_grip);
     let [axis_force, weakest_force, strongest_force] = probe.extremes(0);
     let [axis_torque, weakest_torque, strongest_torque] = probe.extremes(3);
-    let mut solver = probe.solver.clone();
-    let rest = solver.distribute(&probe.strings, &Vector6::zeros());
     Capability {
         pretension: probe.pretension,
-        stray_force: rest.wrench.fixed_rows::<3>(0).norm(),
         condition: condition(geometry, &probe.strings),
         axis_force,
         axis_torque,

@@ -174,7 +174,7 @@ impl Run<'_> {
         let joined = self.runtime.block_on(self.over.or(self.rejoiner.rejoin()));
         match joined {
             None => Ok(None),
-            Some(Err(_gave_up)) => {
+            Some(None) => {
                 let report = self.report(bridge, &format!("the server was lost: {reason}"));
                 Err(BridgeError::ServerLost {
                     server: self.args.server.clone(),
@@ -182,7 +182,7 @@ impl Run<'_> {
                     report: Box::new(report),
                 })
             }
-            Some(Ok(link)) => Ok(Some(link)),
+            Some(Some(link)) => Ok(Some(link)),
         }
     }
 

@@ -16,8 +16,8 @@ use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 use taut_spidar::{
-    Consistency, Encoders, ForwardKinematics, Geometry, LengthRates, MotorState, PoseAnswer,
-    Reading, ResidualMonitor, STRINGS, StringFault, StringHardware, StringMatrix, TensionAnswer,
+    Encoders, ForwardKinematics, Geometry, LengthRates, MotorState, PoseAnswer, Reading,
+    ResidualMonitor, STRINGS, StringFault, StringHardware, StringMatrix, TensionAnswer,
     TensionSettings, TensionSolver, capability,
 };
 
@@ -100,7 +100,6 @@ pub struct SpidarDevice<H> {
     answered: Option<([i32; STRINGS], PoseAnswer)>,
     /// The sample of the newest reading: electronics that are read more slowly give one twice.
     newest: Option<DeviceSample>,
-    consistency: Option<Consistency>,
     tensions: Option<TensionAnswer>,
     /// Samples in a row with a slack string or inconsistent lengths.
     suspicious: u32,
@@ -152,7 +151,6 @@ impl<H: StringHardware> SpidarDevice<H> {
             geometry,
             answered: None,
             newest: None,
-            consistency: None,
             tensions: None,
             suspicious: 0,
             fault: None,
@@ -168,24 +166,12 @@ impl<H: StringHardware> SpidarDevice<H> {
         self
     }
 
-    /// Counts to lengths as calibrated now.
-    #[must_use]
-    pub fn encoders(&self) -> &Encoders {
-        &self.encoders
-    }
-
     /// Says what a motor does. The string of one that does not work is left out of the pose.
     pub fn set_motor(&mut self, string: usize, state: MotorState) {
         (self.answered, self.newest) = (None, None);
         self.solver.set_motor(string, state);
         self.kinematics
             .use_string(string, state == MotorState::Working);
-    }
-
-    /// What the redundant lengths said at the last good sample.
-    #[must_use]
-    pub fn consistency(&self) -> Option<&Consistency> {
-        self.consistency.as_ref()
     }
 
     /// The tensions of the last write, with what they render: N, N m about the grip's centre, axes of the device's frame.
@@ -249,7 +235,6 @@ impl<H: StringHardware> SpidarDevice<H> {
     /// Slack strings and lengths that disagree become a fault when they last.
     fn watch(&mut self, reading: &Reading, answer: &PoseAnswer) -> Result<(), StringFault> {
         let consistency = self.monitor.step(answer);
-        self.consistency = Some(consistency);
         let slack_below = SLACK_SHARE * self.geometry.tension_min;
         let slack = reading.tensions.and_then(|tensions| {
             let used = self.kinematics.used();

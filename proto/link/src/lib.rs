@@ -29,8 +29,8 @@ pub mod server;
 pub mod transport;
 
 pub use client::{
-    ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, GaveUp, GroupReceiver,
-    LinkHealth, LinkWatch, MESH_CACHE_BYTES, MeshCache, Provenance, ReceivedState, ReceivedWrench,
+    ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, GroupReceiver, LinkHealth,
+    LinkWatch, MESH_CACHE_BYTES, MeshCache, Provenance, ReceivedState, ReceivedWrench,
     RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, ServerState, SessionEnd,
     SupervisedLink, connect,
 };

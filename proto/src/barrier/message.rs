@@ -99,12 +99,6 @@ impl ReleaseHead {
         self.place(session)
             .is_some_and(|place| self.waited >> place & 1 == 1)
     }
-
-    /// Whether this member was late at this frame.
-    pub fn is_late(&self, session: u16) -> bool {
-        self.place(session)
-            .is_some_and(|place| self.late >> place & 1 == 1)
-    }
 }
 
 const TERM: Number = Number::new("ReleaseHead.term", COUNT);

@@ -78,11 +78,6 @@ impl Succession {
             && (newest.master != SERVER_SENDER || silent)
     }
 
-    /// Whether this node leads.
-    pub fn leads(&self) -> bool {
-        self.leading.is_some()
-    }
-
     /// Any authentic datagram of the present master came.
     pub fn hear(&mut self, now_ns: u64) {
         self.heard_ns = self.heard_ns.max(now_ns);

@@ -80,12 +80,6 @@ impl Rejoin {
         }
     }
 
-    /// Time without a session, ns.
-    pub fn away_ns(&self, now_ns: u64) -> u64 {
-        self.away_since_ns
-            .map_or(0, |since| now_ns.saturating_sub(since))
-    }
-
     /// What to do at `now_ns`. An attempt that is given out counts as made.
     pub fn step(&mut self, now_ns: u64) -> RejoinStep {
         let give_up_ns = self
@@ -168,7 +162,6 @@ mod tests {
         let mut rejoin = Rejoin::new(settings, 0);
         assert_eq!(attempts(&mut rejoin, 0, 0, 10_000), [0, 100, 300, 700]);
         assert_eq!(rejoin.step(1_200 * MS), RejoinStep::GiveUp);
-        assert_eq!(rejoin.away_ns(1_200 * MS), 1_200 * MS);
         let mut patient = Rejoin::new(RejoinSettings::default(), 0);
         assert!(attempts(&mut patient, 0, 0, 1_000_000).len() > 990);
     }
@@ -193,7 +186,6 @@ mod tests {
                 rejoin.joined(now * MS);
                 now += alive;
                 rejoin.lost(now * MS);
-                prop_assert_eq!(rejoin.away_ns((now + 7) * MS), 7 * MS);
             }
             for pair in made.windows(2) {
                 prop_assert!(pair[1] - pair[0] >= 100);

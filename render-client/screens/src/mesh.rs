@@ -155,12 +155,6 @@ impl OutputMesh {
         });
         both.filter(|corners| corners.iter().all(|&i| self.nodes[i as usize].share >= 0.0))
     }
-
-    /// The targets of a triangle's corners.
-    #[must_use]
-    pub fn targets(&self, corners: [u32; 3]) -> [[f32; 3]; 3] {
-        corners.map(|i| self.nodes[i as usize].target)
-    }
 }
 
 #[cfg(test)]

@@ -223,11 +223,6 @@ impl Gpu {
         summary(&self.adapter.get_info())
     }
 
-    /// The other adapters of this machine.
-    pub fn others(&self) -> &[AdapterSummary] {
-        &self.others
-    }
-
     /// Which adapter was taken, why, and which others there are, as a sentence's end.
     pub fn chosen(&self) -> String {
         let others: Vec<String> = self.others.iter().map(AdapterSummary::to_string).collect();

@@ -39,14 +39,6 @@ pub struct RrdSummary {
     pub lines: Vec<String>,
 }
 
-impl RrdSummary {
-    /// Rows of all entities together.
-    #[must_use]
-    pub fn total_rows(&self) -> u64 {
-        self.rows.values().sum()
-    }
-}
-
 /// Decodes the whole file; an error if any part of it cannot be decoded.
 pub fn inspect(path: &Path) -> Result<RrdSummary, InspectError> {
     let file = File::open(path).map_err(|source| InspectError::Open {

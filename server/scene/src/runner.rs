@@ -174,11 +174,6 @@ impl Runner {
         &self.start
     }
 
-    /// What the scene is made of.
-    pub fn world(&self) -> &World {
-        &self.world
-    }
-
     /// Whether a force can be computed at `time`, s: finite, and not before the last.
     pub fn check_time(&self, time: f64) -> Result<(), String> {
         let in_range = time.abs() <= MAX_TRACE_TIME; // false for NaN

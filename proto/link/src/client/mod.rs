@@ -23,6 +23,6 @@ pub use group::{GroupReceiver, Roster};
 pub use link::{ClientLink, SessionEnd};
 pub use mesh_cache::{MESH_CACHE_BYTES, MeshCache};
 pub use options::{ClientOptions, Provenance, ReceivedState, ReceivedWrench, ServerState};
-pub use rejoiner::{GaveUp, RejoinPolicy, Rejoiner};
+pub use rejoiner::{RejoinPolicy, Rejoiner};
 pub use supervised::{Renewal, SupervisedLink};
 pub use watch::{LinkHealth, LinkWatch};

@@ -1,7 +1,7 @@
 //! Comes to a server, and comes back to it: the same client with a new session, as often as it takes.
 
 use super::{ClientLink, ClientOptions, connect::connect_with, meshes::Meshes};
-use crate::{LinkError, MeshCounters};
+use crate::LinkError;
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -18,8 +18,8 @@ const SHORTEST_ATTEMPT: Duration = Duration::from_secs(1);
 /// Round trips that an attempt is given where they are long; joining takes three.
 const ROUND_TRIPS: u32 = 10;
 
-/// When to go on without a server.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// When to go on without a server. The default ends when the server says so, never for a lost link; silence as the server has it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RejoinPolicy {
     /// Stay when the server says that it stops, and wait for one that is not there yet.
     pub stay: bool,
@@ -27,24 +27,6 @@ pub struct RejoinPolicy {
     pub give_up: Option<Duration>,
     /// Silence of the hot plane after which a session counts as lost; `None`: as the server has it.
     pub dead_after: Option<Duration>,
-}
-
-impl Default for RejoinPolicy {
-    /// Ends when the server says so, never for a lost link; silence as the server has it.
-    fn default() -> RejoinPolicy {
-        RejoinPolicy {
-            stay: false,
-            give_up: None,
-            dead_after: None,
-        }
-    }
-}
-
-/// There was no server for longer than the policy allows.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GaveUp {
-    /// For how long.
-    pub away: Duration,
 }
 
 /// A client without its session: joins, and joins again. Its meshes stay with it.
@@ -56,7 +38,6 @@ pub struct Rejoiner {
     rejoin: Rejoin,
     /// How long an attempt to come back may take.
     attempt: Duration,
-    sessions: u64,
     /// The last reason told: the same is told once.
     last_reason: String,
 }
@@ -78,29 +59,13 @@ impl Rejoiner {
             start: Instant::now(),
             rejoin: Rejoin::new(settings, 0),
             attempt: SHORTEST_ATTEMPT,
-            sessions: 0,
             last_reason: String::new(),
         }
-    }
-
-    /// What the client was given.
-    pub fn options(&self) -> &ClientOptions {
-        &self.options
     }
 
     /// What it does without a server.
     pub fn policy(&self) -> &RejoinPolicy {
         &self.policy
-    }
-
-    /// Sessions so far.
-    pub fn sessions(&self) -> u64 {
-        self.sessions
-    }
-
-    /// Where the meshes came from, over all sessions.
-    pub fn mesh_counters(&self) -> MeshCounters {
-        self.meshes.counters()
     }
 
     /// Joins for the first time. Fails as [`crate::connect`] does, except for what passes: a name that this node's own last life may hold
@@ -136,18 +101,15 @@ impl Rejoiner {
 
     /// Joins again after the session was lost: at once, then after pauses from 0.1 s to 1 s. Whatever the server answers, it is asked again.
     ///
-    /// May be dropped at any moment, and called again.
-    ///
-    /// # Errors
-    /// [`GaveUp`], if the policy says so.
-    pub async fn rejoin(&mut self) -> Result<ClientLink, GaveUp> {
+    /// `None` where there was no server for longer than the policy allows. May be dropped at any moment, and called again.
+    pub async fn rejoin(&mut self) -> Option<ClientLink> {
         self.lost();
         loop {
             match self.rejoin.step(self.now_ns()) {
                 RejoinStep::Wait { until_ns } => self.sleep_until(until_ns).await,
-                RejoinStep::GiveUp => return Err(GaveUp { away: self.away() }),
+                RejoinStep::GiveUp => return None,
                 RejoinStep::Attempt => match self.connect(self.attempt).await {
-                    Ok(link) => return Ok(self.joined(link)),
+                    Ok(link) => return Some(self.joined(link)),
                     Err(error) => self.tell(&error.to_string()),
                 },
             }
@@ -158,11 +120,6 @@ impl Rejoiner {
     pub fn lost(&mut self) {
         let now_ns = self.now_ns();
         self.rejoin.lost(now_ns);
-    }
-
-    /// Time without a session.
-    pub fn away(&self) -> Duration {
-        Duration::from_nanos(self.rejoin.away_ns(self.now_ns()))
     }
 
     /// Logs why there is no session, unless it is the same as before.
@@ -184,7 +141,6 @@ impl Rejoiner {
     fn joined(&mut self, link: ClientLink) -> ClientLink {
         let now_ns = self.now_ns();
         self.rejoin.joined(now_ns);
-        self.sessions += 1;
         self.last_reason.clear();
         let longest = self.options.connect_timeout.max(SHORTEST_ATTEMPT);
         self.attempt = (link.control_round_trip() * ROUND_TRIPS).clamp(SHORTEST_ATTEMPT, longest);

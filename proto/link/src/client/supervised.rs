@@ -199,7 +199,7 @@ where
 {
     let lost = lock(slot).phase;
     loop {
-        let link = Arc::new(rejoiner.rejoin().await.ok()?);
+        let link = Arc::new(rejoiner.rejoin().await?);
         lock(slot).phase = Phase::Rejoining;
         match prepare(link.clone()).await {
             Ok(prepared) => return Some((link, prepared)),

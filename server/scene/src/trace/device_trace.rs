@@ -75,11 +75,6 @@ impl DeviceTrace {
         &self.samples
     }
 
-    /// Whether the trace records buttons.
-    pub fn has_buttons(&self) -> bool {
-        self.has_buttons
-    }
-
     /// Time of a sample since the first one.
     pub fn elapsed(&self, sample: &TraceSample) -> Duration {
         Duration::try_from_secs_f64(sample.time - self.samples[0].time).unwrap_or_default()
