@@ -2,6 +2,7 @@
 
 use super::gpu::Gpu;
 use super::pipeline::{output_pass, to_output};
+use super::resources::bind;
 
 /// The pipeline that combines two pictures into one of `format`.
 #[derive(Debug)]
@@ -23,15 +24,9 @@ impl Anaglyph {
         left: &wgpu::TextureView,
         right: &wgpu::TextureView,
     ) -> wgpu::BindGroup {
-        let entry = |binding, view| wgpu::BindGroupEntry {
-            binding,
-            resource: wgpu::BindingResource::TextureView(view),
-        };
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("anaglyph"),
-            layout: &self.pipeline.get_bind_group_layout(0),
-            entries: &[entry(0, left), entry(1, right)],
-        })
+        let layout = self.pipeline.get_bind_group_layout(0);
+        let eyes = [left, right].map(wgpu::BindingResource::TextureView);
+        bind(device, "anaglyph", &layout, &eyes)
     }
 
     /// Draws the combined picture.

@@ -5,7 +5,8 @@ use nalgebra::{Matrix4, Point3};
 
 use super::gpu::Gpu;
 use super::overlay::{OverlayPipeline, part_of};
-use super::pipeline::{Output, filled, over_all};
+use super::pipeline::{Output, over_all};
+use super::resources::{bind, filled};
 use crate::calibration::{Chart, ChartQuad};
 use crate::hud::Mark;
 use crate::view::Eye;
@@ -38,7 +39,6 @@ impl ChartDrawing {
     ) -> Self {
         const ATTRIBUTES: [wgpu::VertexAttribute; 3] =
             wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4, 2 => Float32x2];
-        let device = &gpu.device;
         let source = include_str!("../../shaders/chart.wgsl");
         let vertices = wgpu::VertexBufferLayout {
             array_stride: size_of::<ChartVertex>() as u64,
@@ -47,15 +47,8 @@ impl ChartDrawing {
         };
         let triangles = wgpu::PrimitiveTopology::TriangleList;
         let pipeline = over_all(gpu, output, "chart", source, triangles, vertices);
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("chart"),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &[
-                entry(0, wgpu::BindingResource::TextureView(&text.letters)),
-                entry(1, wgpu::BindingResource::Sampler(&text.sampler)),
-            ],
-        });
+        let layout = pipeline.get_bind_group_layout(0);
+        let group = bind(&gpu.device, "chart", &layout, &text.resources());
         Self {
             pipeline,
             group,

@@ -18,9 +18,11 @@ use super::mesh::{Batch, Instance, MeshBuffers};
 use super::overlay::OverlayPipeline;
 use super::picture::{PictureTarget, ViewTarget};
 use super::pipeline::{FrameLayout, Output};
+use super::pipelines::Pipelines;
+use super::resources::buffer;
 use super::shadow::ShadowMap;
 use super::warp::WarpPipeline;
-use super::{background, contacts, floor, force, ghost, god_object, mesh, obstacles, shapes};
+use super::{contacts, force, ghost, god_object, obstacles, shapes};
 use crate::comfort::Comfort;
 use crate::detail::{Detail, UNSEEN_PIXELS, made_beside};
 use crate::hud::Overlay;
@@ -67,15 +69,6 @@ struct Shadowed {
     moving: Vec<Instance>,
 }
 
-#[derive(Debug)]
-struct Pipelines {
-    background: wgpu::RenderPipeline,
-    floor: wgpu::RenderPipeline,
-    mesh: wgpu::RenderPipeline,
-    translucent: wgpu::RenderPipeline,
-    ghost: wgpu::RenderPipeline,
-}
-
 /// What the state of this frame asks to be drawn.
 #[derive(Debug)]
 struct Plan {
@@ -102,18 +95,8 @@ impl Renderer {
             samples: gpu.samples(format),
         };
         let layout = FrameLayout::new(device);
-        let pipelines = Pipelines {
-            background: background::pipeline(device, &layout, output),
-            floor: floor::pipeline(device, &layout, output),
-            mesh: mesh::pipeline(
-                device,
-                &layout,
-                output,
-                stage.comfort.nearest_disparity.is_some(),
-            ),
-            translucent: mesh::translucent_pipeline(device, &layout, output),
-            ghost: ghost::pipeline(device, &layout, output),
-        };
+        let fades = stage.comfort.nearest_disparity.is_some();
+        let pipelines = Pipelines::new(device, &layout, output, fades);
         let marks = [shapes::sphere(1.0, 20), shapes::arrow(0.06, 0.25, 24)];
         let meshes = stage.meshes.iter().map(|mesh| &**mesh).chain(&marks);
         let shaded: Vec<Shaded> = meshes.map(ordered).collect();
@@ -123,12 +106,8 @@ impl Renderer {
 
         // Obstacles, god-object, ghost, dots, arrow.
         let most = stage.obstacles.len() + 2 + contacts::MAX_CONTACTS + 1;
-        let instances = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("instances"),
-            size: (most * size_of::<Instance>()) as u64,
-            usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let bytes = (most * size_of::<Instance>()) as u64;
+        let instances = buffer(device, "instances", bytes, wgpu::BufferUsages::VERTEX);
         let bodies = standing_bodies(stage, &mesh_bounds);
         Self {
             output,

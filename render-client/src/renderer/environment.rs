@@ -3,6 +3,7 @@
 use wgpu::util::{DeviceExt, TextureDataOrder};
 
 use super::gpu::Gpu;
+use super::resources::blending_sampler;
 use crate::environment::{Environment, FACE, LEVELS};
 
 /// The cube map of mirrored light and its sampler, and the nine coefficients of the matt light.
@@ -40,13 +41,7 @@ impl EnvironmentMap {
                 dimension: Some(wgpu::TextureViewDimension::Cube),
                 ..Default::default()
             }),
-            sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-                label: Some("environment"),
-                mag_filter: wgpu::FilterMode::Linear,
-                min_filter: wgpu::FilterMode::Linear,
-                mipmap_filter: wgpu::MipmapFilterMode::Linear,
-                ..Default::default()
-            }),
+            sampler: blending_sampler(&gpu.device, "environment"),
             irradiance: environment.irradiance,
         }
     }

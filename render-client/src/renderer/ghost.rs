@@ -5,8 +5,7 @@ use nalgebra::Isometry3;
 use taut_proto::Finish;
 
 use super::god_object::workbench_from_mesh;
-use super::mesh::{Instance, Material, buffer_layouts};
-use super::pipeline::{FrameLayout, Layer, Output, PipelineParts};
+use super::mesh::{Instance, Material};
 use crate::stage::Stage;
 
 const MATERIAL: Material = Material {
@@ -24,25 +23,4 @@ pub(crate) fn instance(stage: &Stage, device_pose: &Isometry3<f64>) -> Instance 
         &workbench_from_mesh(stage, &stage.god_object, device_pose),
         &MATERIAL,
     )
-}
-
-/// The pipeline of translucent bodies.
-pub(crate) fn pipeline(
-    device: &wgpu::Device,
-    layout: &FrameLayout,
-    output: Output,
-) -> wgpu::RenderPipeline {
-    let parts = PipelineParts {
-        label: "ghost",
-        source: concat!(
-            include_str!("../../shaders/mesh.wgsl"),
-            include_str!("../../shaders/ghost.wgsl")
-        ),
-        vertex: "vertex",
-        fragment: "ghost",
-        buffers: &buffer_layouts(),
-        topology: wgpu::PrimitiveTopology::TriangleList,
-        layer: Layer::Translucent,
-    };
-    layout.pipeline(device, output, &parts)
 }

@@ -1,10 +1,10 @@
-//! Meshes on the graphics card, their instances, and the pipeline that draws them lit and opaque.
+//! Meshes on the graphics card, and their instances.
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Matrix4;
 use taut_proto::Finish;
 
-use super::pipeline::{FrameLayout, Layer, Output, PipelineParts, filled};
+use super::resources::filled;
 use crate::detail::{Detail, Level, coarsest};
 use crate::normals::Shaded;
 use crate::stage::{Bounds, StageBody};
@@ -175,43 +175,6 @@ pub(crate) fn buffer_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 2]
             &INSTANCE_ATTRIBUTES,
         ),
     ]
-}
-
-/// The pipeline of lit bodies through which others are seen; their far sides are not drawn.
-pub(crate) fn translucent_pipeline(
-    device: &wgpu::Device,
-    layout: &FrameLayout,
-    output: Output,
-) -> wgpu::RenderPipeline {
-    let parts = PipelineParts {
-        label: "translucent",
-        source: include_str!("../../shaders/mesh.wgsl"),
-        vertex: "vertex",
-        fragment: "translucent",
-        buffers: &buffer_layouts(),
-        topology: wgpu::PrimitiveTopology::TriangleList,
-        layer: Layer::Translucent,
-    };
-    layout.pipeline(device, output, &parts)
-}
-
-/// The pipeline of opaque lit bodies; with `fades` those that come too near fade away.
-pub(crate) fn pipeline(
-    device: &wgpu::Device,
-    layout: &FrameLayout,
-    output: Output,
-    fades: bool,
-) -> wgpu::RenderPipeline {
-    let parts = PipelineParts {
-        label: "mesh",
-        source: include_str!("../../shaders/mesh.wgsl"),
-        vertex: "vertex",
-        fragment: if fades { "fading" } else { "fragment" },
-        buffers: &buffer_layouts(),
-        topology: wgpu::PrimitiveTopology::TriangleList,
-        layer: Layer::Opaque,
-    };
-    layout.pipeline(device, output, &parts)
 }
 
 #[cfg(test)]

@@ -1,12 +1,10 @@
-//! Draws the stage with wgpu: one file per drawn thing, its shader of the same name in `shaders/`.
+//! Draws the stage with wgpu: one file per drawn thing, its shader of the same name in `shaders/`; background and floor are shaders alone.
 
 mod anaglyph;
-mod background;
 mod chart;
 mod contacts;
 mod draw;
 mod environment;
-mod floor;
 mod force;
 mod frame;
 mod ghost;
@@ -18,6 +16,8 @@ mod overlay;
 mod pass_times;
 mod picture;
 mod pipeline;
+mod pipelines;
+mod resources;
 mod shadow;
 pub mod shapes;
 mod warp;

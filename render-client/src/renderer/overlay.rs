@@ -5,6 +5,7 @@ use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_wid
 
 use super::gpu::Gpu;
 use super::pipeline::{Output, over_all};
+use super::resources::{bind, blending_sampler, buffer};
 use crate::hud::{MAX_MARKS, Mark};
 
 /// First and last letter of the texture; others are shown as `UNKNOWN`. The last place is full: for boxes.
@@ -37,8 +38,8 @@ pub(crate) struct Quad {
 pub(crate) struct OverlayPipeline {
     pipeline: wgpu::RenderPipeline,
     group: wgpu::BindGroup,
-    pub(crate) letters: wgpu::TextureView,
-    pub(crate) sampler: wgpu::Sampler,
+    letters: wgpu::TextureView,
+    sampler: wgpu::Sampler,
 }
 
 /// The text of one picture.
@@ -60,29 +61,19 @@ impl OverlayPipeline {
         };
         let strip = wgpu::PrimitiveTopology::TriangleStrip;
         let pipeline = over_all(gpu, output, "overlay", source, strip, quads);
-        let texture = letters(gpu);
-        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("letters"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            mipmap_filter: wgpu::MipmapFilterMode::Linear,
-            ..Default::default()
-        });
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("letters"),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &[
-                entry(0, wgpu::BindingResource::TextureView(&texture)),
-                entry(1, wgpu::BindingResource::Sampler(&sampler)),
-            ],
-        });
+        let (letters, sampler) = (letters(gpu), blending_sampler(device, "letters"));
+        let layout = pipeline.get_bind_group_layout(0);
         Self {
+            group: bind(device, "letters", &layout, &resources(&letters, &sampler)),
             pipeline,
-            group,
-            letters: texture,
+            letters,
             sampler,
         }
+    }
+
+    /// The letters for other pipelines, as [`part_of`] finds them.
+    pub(crate) fn resources(&self) -> [wgpu::BindingResource<'_>; 2] {
+        resources(&self.letters, &self.sampler)
     }
 
     /// Draws `count` quads over what the pass has drawn in its viewport.
@@ -94,15 +85,21 @@ impl OverlayPipeline {
     }
 }
 
+fn resources<'t>(
+    letters: &'t wgpu::TextureView,
+    sampler: &'t wgpu::Sampler,
+) -> [wgpu::BindingResource<'t>; 2] {
+    [
+        wgpu::BindingResource::TextureView(letters),
+        wgpu::BindingResource::Sampler(sampler),
+    ]
+}
+
 impl OverlayQuads {
     pub(crate) fn new(device: &wgpu::Device) -> Self {
+        let size = (MAX_MARKS * size_of::<Quad>()) as u64;
         Self {
-            buffer: device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("overlay"),
-                size: (MAX_MARKS * size_of::<Quad>()) as u64,
-                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
+            buffer: buffer(device, "overlay", size, wgpu::BufferUsages::VERTEX),
         }
     }
 

@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::gpu::Gpu;
+use super::resources::buffer;
 use crate::error::RenderError;
 
 /// Passes of a frame that are timed; those beyond are not.
@@ -25,14 +26,7 @@ impl PassTimes {
         if !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
         }
-        let buffer = |label, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: BYTES,
-                usage: usage | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
+        let buffer = |label, usage| buffer(device, label, BYTES, usage);
         let resolving = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
         Some(Self {
             clock: device.create_query_set(&wgpu::QuerySetDescriptor {

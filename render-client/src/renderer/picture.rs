@@ -5,7 +5,8 @@ use super::chart::ChartDrawing;
 use super::environment::EnvironmentMap;
 use super::gpu::Gpu;
 use super::overlay::OverlayQuads;
-use super::pipeline::{DEPTH, FrameLayout, Output, attachment};
+use super::pipeline::{DEPTH, FrameLayout, Output};
+use super::resources::{attachment, buffer};
 use super::shadow::ShadowMap;
 use super::warp::WarpTarget;
 use crate::error::RenderError;
@@ -131,14 +132,10 @@ impl OffScreen {
         let copied = wgpu::TextureUsages::COPY_SRC;
         let texture = attachment(&gpu.device, "picture", (width, height), output, copied);
         let padded_row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(padded_row) * u64::from(height);
         Self {
             view: texture.create_view(&Default::default()),
-            readback: gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("readback"),
-                size: u64::from(padded_row) * u64::from(height),
-                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-                mapped_at_creation: false,
-            }),
+            readback: buffer(&gpu.device, "readback", bytes, wgpu::BufferUsages::MAP_READ),
             texture,
             size: (width, height),
             padded_row,

@@ -1,10 +1,9 @@
 //! What the pipelines have in common: formats, the shared bind group, the way to build one.
 
-use wgpu::util::DeviceExt;
-
 use super::environment::EnvironmentMap;
 use super::frame::FrameUniform;
 use super::gpu::Gpu;
+use super::resources::{bind, uniform_buffer};
 use super::shadow::ShadowMap;
 
 /// Format of all depth textures.
@@ -32,7 +31,6 @@ pub(crate) enum Layer {
 pub(crate) struct PipelineParts<'a> {
     pub(crate) label: &'a str,
     pub(crate) source: &'a str,
-    pub(crate) vertex: &'a str,
     pub(crate) fragment: &'a str,
     pub(crate) buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
     pub(crate) topology: wgpu::PrimitiveTopology,
@@ -96,24 +94,15 @@ impl FrameLayout {
         shadow: &ShadowMap,
         environment: &EnvironmentMap,
     ) -> (wgpu::Buffer, wgpu::BindGroup) {
-        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("frame"),
-            size: size_of::<FrameUniform>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("frame"),
-            layout: &self.group,
-            entries: &[
-                entry(0, buffer.as_entire_binding()),
-                entry(1, wgpu::BindingResource::TextureView(&shadow.view)),
-                entry(2, wgpu::BindingResource::Sampler(&shadow.sampler)),
-                entry(3, wgpu::BindingResource::TextureView(&environment.view)),
-                entry(4, wgpu::BindingResource::Sampler(&environment.sampler)),
-            ],
-        });
+        let buffer = uniform_buffer::<FrameUniform>(device, "frame");
+        let resources = [
+            buffer.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&shadow.view),
+            wgpu::BindingResource::Sampler(&shadow.sampler),
+            wgpu::BindingResource::TextureView(&environment.view),
+            wgpu::BindingResource::Sampler(&environment.sampler),
+        ];
+        let group = bind(device, "frame", &self.group, &resources);
         (buffer, group)
     }
 
@@ -138,7 +127,7 @@ impl FrameLayout {
             layout: Some(&self.pipeline),
             vertex: wgpu::VertexState {
                 module: &module,
-                entry_point: Some(parts.vertex),
+                entry_point: Some("vertex"),
                 compilation_options: Default::default(),
                 buffers: parts.buffers,
             },
@@ -288,43 +277,5 @@ pub(crate) fn shader(device: &wgpu::Device, label: &str, source: String) -> wgpu
     device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(label),
         source: wgpu::ShaderSource::Wgsl(source.into()),
-    })
-}
-
-/// A buffer filled once.
-pub(crate) fn filled<T: bytemuck::NoUninit>(
-    device: &wgpu::Device,
-    label: &str,
-    contents: &[T],
-    usage: wgpu::BufferUsages,
-) -> wgpu::Buffer {
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some(label),
-        contents: bytemuck::cast_slice(contents),
-        usage,
-    })
-}
-
-/// A texture to draw to.
-pub(crate) fn attachment(
-    device: &wgpu::Device,
-    label: &str,
-    (width, height): (u32, u32),
-    output: Output,
-    usage: wgpu::TextureUsages,
-) -> wgpu::Texture {
-    device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: output.samples,
-        dimension: wgpu::TextureDimension::D2,
-        format: output.format,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-        view_formats: &[],
     })
 }

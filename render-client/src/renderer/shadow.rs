@@ -6,7 +6,8 @@
 use super::frame::KeyLight;
 use super::gpu::Gpu;
 use super::mesh::buffer_layouts;
-use super::pipeline::{DEPTH, Output, attachment, shader};
+use super::pipeline::{DEPTH, Output, shader};
+use super::resources::{attachment, bind, uniform_buffer};
 
 /// The map, its sampler and the pipeline that draws it.
 #[derive(Debug)]
@@ -36,20 +37,9 @@ impl ShadowMap {
         let copied = wgpu::TextureUsages::COPY_SRC;
         let standing = attachment(device, "standing shadow map", size, single, copied);
         let pipeline = pipeline(device);
-        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("shadow"),
-            size: size_of::<[[f32; 4]; 4]>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("shadow"),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: uniform.as_entire_binding(),
-            }],
-        });
+        let uniform = uniform_buffer::<[[f32; 4]; 4]>(device, "shadow");
+        let layout = pipeline.get_bind_group_layout(0);
+        let group = bind(device, "shadow", &layout, &[uniform.as_entire_binding()]);
         Self {
             view: map.create_view(&Default::default()),
             map,

@@ -7,7 +7,8 @@ use wgpu::util::DeviceExt;
 
 use super::gpu::Gpu;
 use super::picture::PictureTarget;
-use super::pipeline::{filled, output_pass, to_output};
+use super::pipeline::{output_pass, to_output};
+use super::resources::{bind, blending_sampler, filled, uniform_buffer};
 use crate::calibration::Chart;
 use crate::correction::{Correction, Hull, clip_from_target};
 use crate::view::{ClipPlanes, Eye, Eyes, Screen};
@@ -75,13 +76,10 @@ impl WarpPipeline {
         };
         let source = include_str!("../../shaders/warp.wgsl");
         let pipeline = to_output(device, format, "warp", source, &[Some(nodes)]);
-        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("warp"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
-        });
-        Self { pipeline, sampler }
+        Self {
+            pipeline,
+            sampler: blending_sampler(device, "warp"),
+        }
     }
 
     /// Draws scenes, warped, each into its pixels of `target`: left, top, width, height.
@@ -123,14 +121,16 @@ impl WarpPipeline {
         let mask = mask_texture(gpu, correction.mask(*picture).map(|mask| &**mask));
         let indices: Vec<[u32; 3]> = mesh.triangles().collect();
         let device = &gpu.device;
+        let layout = self.pipeline.get_bind_group_layout(0);
         let scene = |(eye, picture, view)| {
-            let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("warp"),
-                size: size_of::<WarpUniform>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            let group = self.bind(device, &uniform, &view, &mask);
+            let uniform = uniform_buffer::<WarpUniform>(device, "warp");
+            let resources = [
+                uniform.as_entire_binding(),
+                wgpu::BindingResource::TextureView(&view),
+                wgpu::BindingResource::Sampler(&self.sampler),
+                wgpu::BindingResource::TextureView(&mask),
+            ];
+            let group = bind(device, "warp", &layout, &resources);
             SceneTexture {
                 picture,
                 view,
@@ -148,26 +148,6 @@ impl WarpPipeline {
             indices: filled(device, "warp", &indices, wgpu::BufferUsages::INDEX),
             uniform: uniform(correction, chart.is_some()),
         }
-    }
-
-    fn bind(
-        &self,
-        device: &wgpu::Device,
-        uniform: &wgpu::Buffer,
-        scene: &wgpu::TextureView,
-        mask: &wgpu::TextureView,
-    ) -> wgpu::BindGroup {
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("warp"),
-            layout: &self.pipeline.get_bind_group_layout(0),
-            entries: &[
-                entry(0, uniform.as_entire_binding()),
-                entry(1, wgpu::BindingResource::TextureView(scene)),
-                entry(2, wgpu::BindingResource::Sampler(&self.sampler)),
-                entry(3, wgpu::BindingResource::TextureView(mask)),
-            ],
-        })
     }
 }
 
