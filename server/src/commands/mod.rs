@@ -45,12 +45,9 @@ use clap::Parser;
 use serde::Serialize;
 use taut_bridge::console;
 
-use crate::cli::{
-    ArmArgs, CheckArgs, Cli, Command, DoctorArgs, ExportArgs, FIRST_STEPS, ImportArgs, KeysArgs,
-    PushWrenchArgs, RecordArgs, ReplayArgs, TrackArgs,
-};
+use crate::cli::{CheckArgs, Cli, Command, DoctorArgs, FIRST_STEPS, ReplayArgs};
+use crate::report::SessionReport;
 use crate::report::terminal::Terminal;
-use crate::report::{ReplayReport, SessionReport};
 use crate::shared::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
 use crate::shared::shutdown::Shutdown;
 
@@ -75,7 +72,7 @@ pub fn main() -> ExitCode {
     taut_log::start("warn");
     let done = match cli.command {
         Some(command) => run(command),
-        None => print(FIRST_STEPS).map(|()| ExitCode::SUCCESS),
+        None => print(FIRST_STEPS),
     };
     let code = match done {
         Ok(code) => code,
@@ -105,33 +102,44 @@ fn run(command: Command) -> Result<ExitCode> {
         }
         Command::Bridge(args) => Ok(taut_bridge::execute(&args)),
         Command::SimulateDevice(args) => Ok(taut_bridge::execute_simulation(&args)),
-        Command::Replay(args) => replay_command(&args),
-        Command::Record(args) => record_command(&args),
-        Command::Export(args) => export_command(&args),
-        Command::Arm(args) => arm_command(&args),
-        Command::Edit(args) => print(edit::run(&args)?).map(|()| ExitCode::SUCCESS),
-        Command::Check(args) => check_command(&args),
-        Command::Import(args) => import_command(&args),
-        Command::Preview(args) => {
-            print(preview::run(&args)?.join("\n")).map(|()| ExitCode::SUCCESS)
+        Command::Replay(args) => match &args.recording {
+            Some(directory) => recorded_command(directory, &args),
+            None => tell(&replay::run(&args)?, args.json),
+        },
+        Command::Record(args) => {
+            let (out, rows) = network(2, record::run(&args))?;
+            print(format!("{}: {rows} samples", out.display()))
         }
+        Command::Export(args) => tell(&export::run(&args)?, args.json),
+        Command::Arm(args) => print(network(1, arm::run(&args))?),
+        Command::Edit(args) => print(edit::run(&args)?),
+        Command::Check(args) => check_command(&args),
+        Command::Import(args) => tell(&import::run(&args)?, args.json),
+        Command::Preview(args) => print(preview::run(&args)?.join("\n")),
         Command::Calibrate(args) => match calibrate::run(&args)? {
             written if written.is_empty() => Ok(ExitCode::SUCCESS),
-            written => print(written.join("\n")).map(|()| ExitCode::SUCCESS),
+            written => print(written.join("\n")),
         },
         Command::Doctor(args) => doctor_command(&args),
-        Command::Track(args) => track_command(&args),
-        Command::PushWrench(args) => push_wrench_command(&args),
-        Command::Keys(args) => keys_command(&args),
+        Command::Track(args) => {
+            let sent = network(1, track::run(&args))?;
+            print(format!(
+                "{sent} readings of the head sent to {}",
+                args.server
+            ))
+        }
+        Command::PushWrench(args) => {
+            let sent = network(1, push_wrench::run(&args))?;
+            print(format!("{sent} wrenches sent to {}", args.server))
+        }
+        Command::Keys(args) => print(keys::run(&args)?),
         Command::Setup(args) => {
-            let done = setup::run(&args, std::io::stdin().lock(), std::io::stdout().lock())?;
-            print(done).map(|()| ExitCode::SUCCESS)
+            let (input, output) = (std::io::stdin().lock(), std::io::stdout().lock());
+            print(setup::run(&args, input, output)?)
         }
-        Command::Deploy(args) => print(deploy::run(&args)?).map(|()| ExitCode::SUCCESS),
-        Command::Completions(args) => {
-            print(manual::completions(args.shell)?).map(|()| ExitCode::SUCCESS)
-        }
-        Command::Man(args) => print(manual::write_pages(&args.out)?).map(|()| ExitCode::SUCCESS),
+        Command::Deploy(args) => print(deploy::run(&args)?),
+        Command::Completions(args) => print(manual::completions(args.shell)?),
+        Command::Man(args) => print(manual::write_pages(&args.out)?),
     }
 }
 
@@ -153,30 +161,22 @@ fn end_session(
 }
 
 /// A report on standard output, for programs or for people.
-fn tell<R: Serialize + Display>(report: &R, json: bool) -> Result<()> {
-    if json {
-        print_json(report)
+fn tell<R: Serialize + Display>(report: &R, json: bool) -> Result<ExitCode> {
+    print(if json {
+        as_json(report)?
     } else {
-        print(report.to_string())
-    }
+        report.to_string()
+    })
 }
 
-/// The runtime of a command that only speaks over the network.
-fn network(threads: usize) -> Result<tokio::runtime::Runtime> {
-    tokio::runtime::Builder::new_multi_thread()
+/// What comes of a command that only speaks over the network.
+fn network<T>(threads: usize, command: impl Future<Output = Result<T, Failure>>) -> Result<T> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(threads)
         .enable_all()
         .build()
-        .context("the network's threads cannot be started")
-}
-
-fn replay_command(args: &ReplayArgs) -> Result<ExitCode> {
-    if let Some(directory) = &args.recording {
-        return recorded_command(directory, args);
-    }
-    let report: ReplayReport = replay::run(args)?;
-    tell(&report, args.json)?;
-    Ok(ExitCode::SUCCESS)
+        .context("the network's threads cannot be started")?;
+    Ok(runtime.block_on(command)?)
 }
 
 /// A session computed again must come to the same: a difference is a failure.
@@ -191,29 +191,10 @@ fn recorded_command(directory: &Path, args: &ReplayArgs) -> Result<ExitCode> {
     })
 }
 
-fn record_command(args: &RecordArgs) -> Result<ExitCode> {
-    let runtime = network(2)?;
-    let (out, rows) = runtime.block_on(record::run(args))?;
-    print(format!("{}: {rows} samples", out.display()))?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn export_command(args: &ExportArgs) -> Result<ExitCode> {
-    let report = export::run(args)?;
-    tell(&report, args.json)?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn arm_command(args: &ArmArgs) -> Result<ExitCode> {
-    let runtime = network(1)?;
-    print(runtime.block_on(arm::run(args))?)?;
-    Ok(ExitCode::SUCCESS)
-}
-
 fn check_command(args: &CheckArgs) -> Result<ExitCode> {
     let reports = check::reports(&args.files);
     if args.json {
-        print_json(&reports)?;
+        print(as_json(&reports)?)?;
     } else {
         for report in &reports {
             print(report.to_string())?;
@@ -227,54 +208,21 @@ fn check_command(args: &CheckArgs) -> Result<ExitCode> {
     })
 }
 
-fn import_command(args: &ImportArgs) -> Result<ExitCode> {
-    let report = import::run(args)?;
-    tell(&report, args.json)?;
-    Ok(ExitCode::SUCCESS)
-}
-
 fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
     if let Some(device) = &args.device {
         let report = doctor::device::examine(device, args.out.as_deref())?;
-        tell(&report, args.json)?;
-        return Ok(ExitCode::SUCCESS);
+        return tell(&report, args.json);
     }
     let report = doctor::examine().context("this machine cannot be examined")?;
-    tell(&report, args.json)?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn keys_command(args: &KeysArgs) -> Result<ExitCode> {
-    print(keys::run(args)?)?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn track_command(args: &TrackArgs) -> Result<ExitCode> {
-    let runtime = network(1)?;
-    let sent = runtime.block_on(track::run(args))?;
-    print(format!(
-        "{sent} readings of the head sent to {}",
-        args.server
-    ))?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn push_wrench_command(args: &PushWrenchArgs) -> Result<ExitCode> {
-    let runtime = network(1)?;
-    let sent = runtime.block_on(push_wrench::run(args))?;
-    print(format!("{sent} wrenches sent to {}", args.server))?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn print_json(value: &impl Serialize) -> Result<()> {
-    print(as_json(value)?)
+    tell(&report, args.json)
 }
 
 fn as_json(value: &impl Serialize) -> Result<String> {
     serde_json::to_string_pretty(value).context("the report cannot be written as JSON")
 }
 
-/// Prints the result of a command that holds no session.
-fn print(text: impl Into<String>) -> Result<()> {
-    console::print(text).context("standard output cannot be written; check the free space")
+/// Prints the result of a command that holds no session: its success.
+fn print(text: impl Into<String>) -> Result<ExitCode> {
+    console::print(text).context("standard output cannot be written; check the free space")?;
+    Ok(ExitCode::SUCCESS)
 }
