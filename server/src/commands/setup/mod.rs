@@ -168,13 +168,11 @@ fn device_names() -> String {
 
 fn stereo(questions: &mut Questions<impl BufRead, impl Write>) -> Result<&'static str, Failure> {
     let names = Stereo::NAMED.map(|(name, _)| name);
-    let known = |text: &str| names.iter().copied().find(|name| *name == text);
-    let answer = questions.text("stereo", &names.join(", "), "side-by-side", |text| {
-        known(text)
-            .map(|_| ())
-            .ok_or_else(|| format!("write one of {}", names.join(", ")))
-    })?;
-    Ok(known(&answer).unwrap_or("mono"))
+    let known = names.join(", ");
+    questions.read("stereo", &known, "side-by-side", |text| {
+        let name = names.iter().copied().find(|name| *name == text);
+        name.ok_or_else(|| format!("write one of {known}"))
+    })
 }
 
 fn address(
@@ -196,13 +194,8 @@ fn address(
         Err(_) => Err("write an IP address such as 192.0.2.10".to_owned()),
     }
     };
-    let text = questions.text(
-        what,
-        "IP address on the network of the workbench",
-        &default.to_string(),
-        |text| read(text).map(|_| ()),
-    )?;
-    read(&text).map_err(Failure::BadInput)
+    let explained = "IP address on the network of the workbench";
+    questions.read(what, explained, &default.to_string(), read)
 }
 
 /// A machine's name is a file's, too.

@@ -70,10 +70,7 @@ impl<R: BufRead, W: Write> Questions<R, W> {
             Ok(number) if low <= number && number <= high => Ok(number),
             _ => Err(format!("write a number from {low} to {high}")),
         };
-        let text = self.text(what, explained, &default.to_string(), |text| {
-            read(text).map(|_| ())
-        })?;
-        read(&text).map_err(Failure::BadInput)
+        self.read(what, explained, &default.to_string(), read)
     }
 
     /// A whole number from 1 on.
@@ -88,9 +85,18 @@ impl<R: BufRead, W: Write> Questions<R, W> {
             Ok(count) if (1..=most).contains(&count) => Ok(count),
             _ => Err(format!("write a whole number from 1 to {most}")),
         };
-        let text = self.text(what, explained, &default.to_string(), |text| {
-            read(text).map(|_| ())
-        })?;
+        self.read(what, explained, &default.to_string(), read)
+    }
+
+    /// Whatever `read` makes of an answer.
+    pub(super) fn read<T>(
+        &mut self,
+        what: &str,
+        explained: &str,
+        default: &str,
+        read: impl Fn(&str) -> Result<T, String>,
+    ) -> Result<T, Failure> {
+        let text = self.text(what, explained, default, |text| read(text).map(|_| ()))?;
         read(&text).map_err(Failure::BadInput)
     }
 
