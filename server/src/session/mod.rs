@@ -25,6 +25,7 @@ mod reporting;
 mod ros_order;
 pub mod setup;
 mod start;
+mod state_events;
 mod threads;
 
 use std::net::SocketAddr;
