@@ -4,7 +4,7 @@
 //! **workbench** frame (x right, y away from the viewer, z up), and this maps it to the **world** frame of the
 //! simulation, which may be turned and drawn larger.
 
-use nalgebra::{Isometry3, Point3, Similarity3, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, Similarity3, Vector3};
 use taut_link::proto::SceneDescription;
 
 use crate::device::Pose;
@@ -91,13 +91,6 @@ impl Placement {
         let lever = pose.rotation * self.reference_point.coords;
         Isometry3::from_parts((pose.translation.vector - lever).into(), pose.rotation)
     }
-}
-
-/// Linear, then angular.
-pub(crate) fn stacked(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(
-        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
-    )
 }
 
 #[cfg(test)]

@@ -12,11 +12,12 @@
 use std::time::Duration;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
+use taut_plant::stack;
 use taut_vrpn::{PoseReport, SensorMapping};
 
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 use crate::devices::Anchor;
-use crate::placement::{Placement, stacked};
+use crate::placement::Placement;
 
 /// Of the loop around it, Hz.
 const RATE_HZ: f64 = 1000.0;
@@ -181,7 +182,7 @@ impl ArmDevice {
         let moving =
             self.mapping.axes.matrix() * Vector3::from(state.velocity) * self.mapping.scale;
         let moving = self.mapping.origin.rotation * moving;
-        self.velocity = stacked(&self.placement.vector_in_world(&moving), &turning);
+        self.velocity = stack(&self.placement.vector_in_world(&moving), &turning);
         self.at_g = next;
         self.seen = (state.reports, measured);
         Ok(())

@@ -12,9 +12,9 @@
 use std::time::Duration;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
+use taut_plant::stack;
 
 use crate::device::Pose;
-use crate::placement::stacked;
 
 /// Weight of a new interval in the smoothed one.
 const SMOOTHING: f64 = 0.1;
@@ -81,7 +81,7 @@ impl Glide {
         let travel = self.to.translation.vector - self.from.translation.vector;
         let position = self.from.translation.vector + travel * fraction;
         let rotation = UnitQuaternion::from_scaled_axis(self.turn * fraction) * self.from.rotation;
-        let velocity = stacked(&(travel / self.leg), &(self.turn / self.leg));
+        let velocity = stack(&(travel / self.leg), &(self.turn / self.leg));
         (Isometry3::from_parts(position.into(), rotation), velocity)
     }
 }

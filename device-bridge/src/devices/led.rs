@@ -10,9 +10,10 @@
 use std::time::Duration;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
+use taut_plant::stack;
 
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
-use crate::placement::{Placement, stacked};
+use crate::placement::Placement;
 
 /// tau: two frames of a slow window.
 const LAG_S: f64 = 0.04;
@@ -101,7 +102,7 @@ impl Device for LedDevice {
         Ok(DeviceSample {
             time: now,
             pose: self.placement.from_reference_point(&self.pose),
-            velocity: stacked(&linear, &angular),
+            velocity: stack(&linear, &angular),
             buttons: target.buttons,
         })
     }

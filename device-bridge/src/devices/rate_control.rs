@@ -17,9 +17,10 @@
 use std::time::Duration;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
+use taut_plant::stack;
 
 use crate::device::Pose;
-use crate::placement::{Placement, stacked};
+use crate::placement::Placement;
 
 /// Time constant of the approach to a position, s: slower than the hand's own tremor, faster than its patience.
 const POSITION_LAG_S: f64 = 0.05;
@@ -154,7 +155,7 @@ impl RateControl {
             turn * self.pose.rotation,
         );
         self.pose.rotation.renormalize_fast();
-        self.velocity = stacked(&linear, &angular);
+        self.velocity = stack(&linear, &angular);
     }
 
     /// Velocity of G and angular velocity that the cap asks for, world axes.

@@ -15,6 +15,7 @@
 use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
+use taut_plant::stack;
 use taut_spidar::{
     Encoders, ForwardKinematics, Geometry, LengthRates, MotorState, PoseAnswer, Reading,
     ResidualMonitor, STRINGS, StringFault, StringHardware, StringMatrix, TensionAnswer,
@@ -322,10 +323,6 @@ impl<H: StringHardware> Device for SpidarDevice<H> {
     fn computing_time(&self) -> Option<Duration> {
         self.clock.map(|_| self.spent.1)
     }
-}
-
-fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::from_fn(|k, _| if k < 3 { linear[k] } else { angular[k - 3] })
 }
 
 fn halves(six: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {

@@ -15,8 +15,7 @@
 //! cap's axes, which these drivers agree on.
 
 use nalgebra::{Vector3, Vector6};
-
-use crate::placement::stacked;
+use taut_plant::stack;
 
 /// Counts that count as full deflection.
 pub(crate) const FULL_DEFLECTION: f64 = 350.0;
@@ -130,7 +129,7 @@ impl CapState {
             let [x, y, z] = counts.map(|count| f64::from(count) / FULL_DEFLECTION);
             Vector3::new(x, -y, -z).map(|u| u.clamp(-1.0, 1.0))
         };
-        stacked(&upright(self.translation), &upright(self.rotation))
+        stack(&upright(self.translation), &upright(self.rotation))
     }
 }
 
