@@ -45,20 +45,7 @@ pub(super) fn declared(
             Ok(Some(of_strings(&geometry, hand.or(scene_hand))))
         }
         (Device::Simulated { hand, .. }, None) => {
-            let grip = Grip::workbench();
-            Ok(Some(DeviceDynamics {
-                mass: grip.mass,
-                damping: grip.damping.min(),
-                friction: grip.coulomb_force.min(),
-                resolution: 0.0,
-                inertia: grip.rotational_inertia,
-                rotational_damping: grip.rotational_damping.min(),
-                rotational_friction: grip.coulomb_torque.min(),
-                angular_resolution: 0.0,
-                delay: 0.0,
-                motor_lag: 0.0,
-                hand: hand.or(scene_hand).unwrap_or_default(),
-            }))
+            Ok(Some(of_grip(&Grip::workbench(), hand.or(scene_hand))))
         }
         // It feels nothing.
         (Device::Trace { .. }, _) => Ok(None),
@@ -77,17 +64,8 @@ pub(super) fn of_input(
 ) -> Option<(DeviceDynamics, bool)> {
     let device = choice.force_device()?;
     let own = in_file.unwrap_or_else(|| DeviceDynamics {
-        mass: device.grip.mass,
-        damping: device.grip.damping.min(),
-        friction: device.grip.coulomb_force.min(),
-        resolution: 0.0,
-        inertia: device.grip.rotational_inertia,
-        rotational_damping: device.grip.rotational_damping.min(),
-        rotational_friction: device.grip.coulomb_torque.min(),
-        angular_resolution: 0.0,
         delay: device.delay_s,
-        motor_lag: 0.0,
-        hand: scene_hand.unwrap_or_default(),
+        ..of_grip(&device.grip, scene_hand)
     });
     // The same force over another way.
     let shorter = device.scale.map_or(1.0, |scale| display_scale / scale);
@@ -114,15 +92,27 @@ fn of_strings(geometry: &Geometry, hand: Option<HandPreset>) -> DeviceDynamics {
         .fold(0.0_f64, |most, count| most.max(count.abs()));
     DeviceDynamics {
         mass: least(0..3),
-        damping: grip.damping.min(),
-        friction: grip.coulomb_force.min(),
         resolution: count,
         inertia: least(3..6),
+        angular_resolution: count / geometry.arm(),
+        motor_lag: geometry.motor_time_constant,
+        ..of_grip(&grip, hand)
+    }
+}
+
+/// What a device of this grip is along and about its weakest axis, if it measures without steps and pushes at once.
+fn of_grip(grip: &Grip, hand: Option<HandPreset>) -> DeviceDynamics {
+    DeviceDynamics {
+        mass: grip.mass,
+        damping: grip.damping.min(),
+        friction: grip.coulomb_force.min(),
+        resolution: 0.0,
+        inertia: grip.rotational_inertia,
         rotational_damping: grip.rotational_damping.min(),
         rotational_friction: grip.coulomb_torque.min(),
-        angular_resolution: count / geometry.arm(),
+        angular_resolution: 0.0,
         delay: 0.0,
-        motor_lag: geometry.motor_time_constant,
+        motor_lag: 0.0,
         hand: hand.unwrap_or_default(),
     }
 }
