@@ -11,4 +11,4 @@ pub use messages::{
     Header, Joy, Message, PoseStamped, ReceivedWrench, TfMessage, TransformStamped, TwistStamped,
     WrenchStamped, obstacle_frame, reference_frame,
 };
-pub use wire::{Attachment, Domain, Node, is_topic, is_word};
+pub use wire::{Attachment, Domain, Node};

@@ -4,6 +4,7 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
 use super::parts::{Files, MIN_STATES, bind, port};
+use super::ros_names::is_word;
 use super::token::read_token;
 use crate::document::{Range, Section};
 
@@ -180,10 +181,6 @@ pub(super) fn zenoh(section: &Section<'_>, files: &Files<'_>) -> Zenoh {
             .integer("ros_domain", 0, LAST_ROS_DOMAIN)
             .and_then(|domain| u8::try_from(domain).ok())
             .unwrap_or(default.ros_domain),
-    };
-    let is_word = |name: &str| {
-        !name.starts_with(|c: char| c.is_ascii_digit())
-            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
     };
     if zenoh.ros && !is_word(&zenoh.name) {
         let at = section.get("name").map_or(section.at(), |node| &node.at);

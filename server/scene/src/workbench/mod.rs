@@ -17,6 +17,7 @@ mod output;
 mod parse;
 pub(crate) mod parts;
 mod realtime;
+mod ros_names;
 mod safety;
 mod scale;
 mod spec;

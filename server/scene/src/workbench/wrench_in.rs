@@ -1,6 +1,7 @@
 //! `[wrench_in]`: a force from outside (a robot's sensor, a simulation) that the hand feels beside the contact's. Off unless the file says otherwise.
 
 use super::looking_on::Zenoh;
+use super::ros_names::is_topic;
 use super::spec::{Device, Network, Passivity, Safety};
 use crate::document::{Range, Section};
 
@@ -137,21 +138,9 @@ fn age(section: &Section<'_>) -> Option<f64> {
     Some(age)
 }
 
-/// An absolute name of ROS 2: parts of letters, digits and `_`, none of which begins with a digit.
 fn ros_topic(section: &Section<'_>, topic: Option<&str>) -> Option<String> {
-    let is_name = |part: &str| {
-        part.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
-            && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-    };
     match topic {
-        Some(text)
-            if text.len() <= 200
-                && text
-                    .strip_prefix('/')
-                    .is_some_and(|rest| rest.split('/').all(is_name)) =>
-        {
-            Some(text.to_owned())
-        }
+        Some(text) if is_topic(text) => Some(text.to_owned()),
         Some(text) => {
             let at = section.get("topic").map_or(section.at(), |node| &node.at);
             section.complain(
