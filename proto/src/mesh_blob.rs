@@ -156,14 +156,6 @@ impl MeshBlob {
         &self.positions
     }
 
-    /// Positions for drawing.
-    pub fn positions_f32(&self) -> Vec<[f32; 3]> {
-        match &self.positions {
-            Positions::F32(list) => list.clone(),
-            Positions::F64(list) => list.iter().map(|p| p.map(|x| x as f32)).collect(),
-        }
-    }
-
     /// Positions for computing.
     pub fn positions_f64(&self) -> Vec<[f64; 3]> {
         match &self.positions {

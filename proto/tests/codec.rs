@@ -226,10 +226,9 @@ fn tetrahedron() -> MeshBlob {
 #[test]
 fn a_mesh_comes_back_in_both_precisions_with_and_without_normals_and_finish() {
     let double = tetrahedron();
-    for positions in [
-        double.positions().clone(),
-        Positions::F32(double.positions_f32()),
-    ] {
+    let single = |p: [f64; 3]| p.map(|x| x as f32);
+    let singles = double.positions_f64().into_iter().map(single).collect();
+    for positions in [double.positions().clone(), Positions::F32(singles)] {
         for normals in [None, Some(vec![[0.0, 0.0, 1.0]; 4])] {
             let mesh = MeshBlob::new(positions.clone(), double.triangles().to_vec(), normals)
                 .unwrap_or_else(|error| panic!("{error}"));

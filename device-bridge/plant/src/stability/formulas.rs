@@ -11,7 +11,7 @@
 //! | Delta  | `resolution`        | m       | of the encoder                                 |
 //!
 //! The same about an axis, with N m for N and rad for m.
-//! Sources: Colgate & Schenkel 1997; Gil et al. 2004, Hulin et al. 2006; Abbott & Okamura 2005; Diolaiti et al. 2006.
+//! Sources: Colgate & Schenkel 1997; Gil et al. 2004, Hulin et al. 2006; Abbott & Okamura 2005.
 
 use std::f64::consts::PI;
 
@@ -69,21 +69,6 @@ pub fn passive_damping(stiffness: f64, virtual_damping: f64, period: f64, delay:
     largest
 }
 
-/// The speed below which friction takes up what the hold leaks, m/s: `f_c / (K (T/2 + t_d) - b)`; infinite where the damping
-/// alone does.
-///
-/// The hold leaks `K v^2 T (T/2 + t_d)` per sample, friction removes `(b v^2 + f_c |v|) T`: an unstable wall is calm after a
-/// start slower than this. Source: the energy of a sample, after Diolaiti et al. 2006.
-#[must_use]
-pub fn calm_speed(stiffness: f64, damping: f64, coulomb: f64, period: f64, delay: f64) -> f64 {
-    let leak = stiffness * (0.5 * period + delay) - damping;
-    if leak > 0.0 {
-        coulomb / leak
-    } else {
-        f64::INFINITY
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,12 +111,5 @@ mod tests {
         assert_eq!(passive_limit_quantised(1.0, 1.0, PERIOD, 29.24e-6), 2000.0);
         assert_eq!(passive_limit_quantised(1.0, 0.0, PERIOD, 0.0), 2000.0);
         assert_eq!(passive_limit_quantised(1.0, 0.0, PERIOD, 1e-5), 0.0);
-    }
-
-    #[test]
-    fn friction_calms_slow_motions_only() {
-        let speed = calm_speed(3000.0, 1.0, 0.02, PERIOD, 0.0);
-        assert!((speed - 0.04).abs() < 1e-12);
-        assert_eq!(calm_speed(1000.0, 1.0, 0.0, PERIOD, 0.0), f64::INFINITY);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{SampledLoop, calm_speed, passive_damping};
+use super::{SampledLoop, passive_damping};
 
 /// Relative width in which the largest passive stiffness is told.
 const BRACKET: f64 = 1e-6;
@@ -91,14 +91,6 @@ impl DeclaredAxis {
             passive: by_damping.min(by_resolution),
             passive_limit,
         }
-    }
-
-    /// Speed below which Coulomb friction takes up what a wall of `stiffness` leaks, m/s or rad/s.
-    #[must_use]
-    pub fn calm_speed(&self, stiffness: f64) -> f64 {
-        let axis = &self.sampled;
-        let late = axis.delay + axis.motor_lag;
-        calm_speed(stiffness, axis.damping, self.coulomb, axis.period, late)
     }
 
     /// The device's damping alone, against hold, delay and lag (taken as a delay), by bisection.
@@ -202,12 +194,5 @@ mod tests {
         };
         assert!(held.verdict().stable > 4.0 * alone.verdict().stable);
         assert_eq!(held.verdict().passive, alone.verdict().passive);
-    }
-
-    #[test]
-    fn friction_calms_what_is_unstable_while_it_is_slow() {
-        let axis = axis(1.0, 0.02, 0.0);
-        assert!((axis.calm_speed(3000.0) - 0.04).abs() < 1e-12);
-        assert_eq!(axis.calm_speed(1000.0), f64::INFINITY);
     }
 }
