@@ -161,10 +161,7 @@ pub enum ShowArg {
 /// because it owns one.
 pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     let limits = Limits::of(&args)?;
-    let choice = args
-        .gpu
-        .as_ref()
-        .map_or_else(GpuChoice::default, GpuChoice::named);
+    let choice = GpuChoice::of(args.gpu.as_deref());
     let policy = args.membership.policy()?;
 
     // Without an adapter there is no use in joining the server.
@@ -379,23 +376,7 @@ impl RenderReport {
         Self {
             node: args.node.clone(),
             transport: args.transport.name().to_owned(),
-            adapter: String::new(),
-            present_timing: String::new(),
-            light_ms: Default::default(),
-            unlit: 0,
-            frames: 0,
-            locked_frames: 0,
-            stale_frames: 0,
-            fps: 0.0,
-            pose_age_ms: Default::default(),
-            drawn_age_ms: Default::default(),
-            packets_lost: 0,
-            packets_received: 0,
-            sessions: 0,
-            longest_gap_ms: 0.0,
-            to_first_frame_ms: None,
-            meshes: Default::default(),
-            ended: Ended::Interrupted,
+            ..Self::default()
         }
     }
 }

@@ -26,7 +26,7 @@ pub(crate) const NO_WINDOW: &str =
     "not known, the times told are those of calls alone: no window lights up";
 
 /// Why a node stopped drawing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Ended {
     /// As many frames as were asked for are drawn.
     Frames,
@@ -35,13 +35,14 @@ pub enum Ended {
     /// The server said that it stops.
     ServerStopped,
     /// A signal (Ctrl-C, SIGTERM).
+    #[default]
     Interrupted,
     /// The user closed a window.
     Closed,
 }
 
-/// What a node did.
-#[derive(Clone, Debug)]
+/// What a node did; by default it was asked to end before it did anything.
+#[derive(Clone, Debug, Default)]
 pub struct RenderReport {
     /// Its name.
     pub node: String,

@@ -37,9 +37,9 @@ impl Default for GpuChoice {
 }
 
 impl GpuChoice {
-    /// The adapter of this number or name.
-    pub fn named(wanted: impl Into<String>) -> Self {
-        Self(Some(wanted.into()))
+    /// The adapter of this number or name, the default without one.
+    pub fn of(wanted: Option<&str>) -> Self {
+        wanted.map_or_else(Self::default, |wanted| Self(Some(wanted.to_owned())))
     }
 }
 
@@ -413,7 +413,7 @@ mod tests {
     }
 
     fn asked(wanted: &str) -> GpuChoice {
-        GpuChoice::named(wanted)
+        GpuChoice::of(Some(wanted))
     }
 
     #[test]

@@ -17,10 +17,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<Vec<String>, Failure> {
     if let Some(fault) = workbench.screen_faults().first() {
         return Err(Failure::bad_input(fault));
     }
-    let choice = args
-        .gpu
-        .as_ref()
-        .map_or_else(GpuChoice::default, GpuChoice::named);
+    let choice = GpuChoice::of(args.gpu.as_deref());
     match &args.out {
         Some(folder) => write_all(args, &workbench, &choice, folder),
         None => show(args, &workbench, choice).map(|()| Vec::new()),

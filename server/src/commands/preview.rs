@@ -29,10 +29,7 @@ pub(super) fn run(args: &PreviewArgs) -> Result<Vec<String>, Failure> {
         _ => vec![args.out.clone()],
     };
     check_place(&args.out)?;
-    let choice = args
-        .gpu
-        .as_ref()
-        .map_or_else(GpuChoice::default, GpuChoice::named);
+    let choice = GpuChoice::of(args.gpu.as_deref());
     let size = args.size.unwrap_or(PREVIEW_SIZE);
     let usual = args.film.map_or(1, |_| FILM_VIEWS);
     let preview = preview(&args.scene, &choice, size, args.orbit.unwrap_or(usual))?;
