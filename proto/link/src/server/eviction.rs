@@ -4,7 +4,7 @@
 //! closed and joins again. Those who merely watch are left to QUIC, which forgives a pause of a second: nobody waits for them.
 
 use super::{AlsoKey, LinkEvent, session::Session, shared::Shared};
-use crate::framing::{CLOSE_EVICTED, CLOSE_REFUSED};
+use crate::framing::CLOSE_EVICTED;
 use std::{sync::Weak, time::Duration};
 use taut_proto::{
     Role,
@@ -84,15 +84,9 @@ fn end_also_key(shared: &Shared) {
         return;
     }
     for session in shared.sessions.all().iter() {
-        if session.by_also_key && shared.sessions.remove(session.number) {
+        if session.by_also_key {
             let reason = "the time of its cluster key is over: give it a credential of the new one";
-            tracing::info!(node = session.node, "shut out: {reason}");
-            session.connection.close(CLOSE_REFUSED, reason.as_bytes());
-            shared.counters.shut_out.one();
-            shared.tell(LinkEvent::Left {
-                status: session.status(shared.clock.now_ns()),
-                reason: reason.to_owned(),
-            });
+            shared.shut_out(session, reason.to_owned());
         }
     }
 }

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     Counters, LinkError, STOP_REASON, SessionClock,
     counters::CounterCells,
-    framing::{CLOSE_CHANGING, CLOSE_REFUSED, CLOSE_STOPPING},
+    framing::{CLOSE_CHANGING, CLOSE_STOPPING},
     lock::{Mutex, lock},
     transport,
 };
@@ -261,20 +261,8 @@ impl ServerLink {
         *present = policy;
         let mut ended = 0;
         for session in shared.sessions.all().iter() {
-            let Err(shut_out) = present.check(session.claim()) else {
-                continue;
-            };
-            // One that left by itself just now is gone already, and told.
-            if shared.sessions.remove(session.number) {
-                let reason = shut_out.to_string();
-                tracing::info!(node = session.node, "shut out: {reason}");
-                session.connection.close(CLOSE_REFUSED, reason.as_bytes());
-                shared.counters.shut_out.one();
-                shared.tell(LinkEvent::Left {
-                    status: session.status(shared.clock.now_ns()),
-                    reason,
-                });
-                ended += 1;
+            if let Err(why) = present.check(session.claim()) {
+                ended += usize::from(shared.shut_out(session, why.to_string()));
             }
         }
         ended

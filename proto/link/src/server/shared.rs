@@ -9,6 +9,7 @@ use super::{
 use crate::{
     SessionClock,
     counters::CounterCells,
+    framing::CLOSE_REFUSED,
     lock::{Mutex, lock},
 };
 use std::{
@@ -83,6 +84,21 @@ impl Shared {
         if self.events.try_send(event).is_err() {
             self.counters.events_dropped.one();
         }
+    }
+
+    /// Ends the session of a client that may not be in any more; `false` if it left by itself just now: then that is told already.
+    pub(crate) fn shut_out(&self, session: &Session, reason: String) -> bool {
+        let is_in = self.sessions.remove(session.number);
+        if is_in {
+            tracing::info!(node = session.node, "shut out: {reason}");
+            session.connection.close(CLOSE_REFUSED, reason.as_bytes());
+            self.counters.shut_out.one();
+            self.tell(LinkEvent::Left {
+                status: session.status(self.clock.now_ns()),
+                reason,
+            });
+        }
+        is_in
     }
 }
 
