@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpStream, UdpSocket};
 use std::os::unix::net::UnixDatagram;
+use std::path::Path;
 use std::time::Duration;
 
 use crate::support::{PATIENCE, Running, Workplace, command, signal, wait_until, workbench};
@@ -142,17 +143,25 @@ fn what_strangers_and_clients_write_is_shown_harmless_and_audited_and_metrics_ar
     assert!(server.end("-TERM").status.success());
 }
 
+/// Where a service manager hears the process that it started.
+fn manager(path: &Path) -> UnixDatagram {
+    let manager = UnixDatagram::bind(path).expect("a socket");
+    manager.set_read_timeout(Some(PATIENCE)).expect("a socket");
+    manager
+}
+
+fn hear(manager: &UnixDatagram) -> String {
+    let mut bytes = [0; 1024];
+    let length = manager.recv(&mut bytes).expect("a message in time");
+    String::from_utf8_lossy(&bytes[..length]).into_owned()
+}
+
 #[test]
 fn a_service_manager_hears_ready_then_signs_of_life_then_stopping() {
     let place = Workplace::new();
     let path = place.path("notify");
-    let manager = UnixDatagram::bind(&path).expect("a socket");
-    manager.set_read_timeout(Some(PATIENCE)).expect("a socket");
-    let hear = || {
-        let mut bytes = [0; 1024];
-        let length = manager.recv(&mut bytes).expect("a message in time");
-        String::from_utf8_lossy(&bytes[..length]).into_owned()
-    };
+    let manager = manager(&path);
+    let hear = || hear(&manager);
     let server = serve(
         &place,
         &[],
@@ -184,13 +193,8 @@ fn a_service_manager_hears_ready_then_signs_of_life_then_stopping() {
 fn another_scene_is_no_stop_to_a_service_manager() {
     let place = Workplace::new();
     let path = place.path("notify");
-    let manager = UnixDatagram::bind(&path).expect("a socket");
-    manager.set_read_timeout(Some(PATIENCE)).expect("a socket");
-    let hear = || {
-        let mut bytes = [0; 1024];
-        let length = manager.recv(&mut bytes).expect("a message in time");
-        String::from_utf8_lossy(&bytes[..length]).into_owned()
-    };
+    let manager = manager(&path);
+    let hear = || hear(&manager);
     let server = serve(
         &place,
         &["--follow-scene"],
@@ -236,13 +240,8 @@ fn bridge_tracker_and_recorder_tell_the_service_manager_that_they_live() {
     ];
     for (role, more, status) in roles {
         let path = place.path(role);
-        let manager = UnixDatagram::bind(&path).expect("a socket");
-        manager.set_read_timeout(Some(PATIENCE)).expect("a socket");
-        let hear = || {
-            let mut bytes = [0; 1024];
-            let length = manager.recv(&mut bytes).expect("a message in time");
-            String::from_utf8_lossy(&bytes[..length]).into_owned()
-        };
+        let manager = manager(&path);
+        let hear = || hear(&manager);
         let always = [role, "--server", &server, "--key", &key, "--stay"];
         let child = Running::of(
             command(&[&always, more].concat())
