@@ -29,6 +29,7 @@ pub mod edge;
 mod external;
 pub mod haply;
 mod own_stamps;
+mod own_thread;
 mod placement;
 mod plugged;
 pub mod plugin;
@@ -76,6 +77,7 @@ pub use external::{
     ExternalWrench, ExternalWrenchSettings, ExternalWrenchStatistics, JudgedWrench, MAX_AHEAD,
     NewestWrench, Refused, SentWrench, WrenchAxes, WrenchReader,
 };
+pub use own_thread::OwnThread;
 pub use placement::Placement;
 pub use plugged::{PluggedPort, plugged_ports};
 pub use port::{

@@ -12,6 +12,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::ioctl_fionbio;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
+use crate::own_thread::OwnThread;
 use crate::realtime::monotonic_now;
 use crate::simulated_place::make_room;
 
@@ -29,8 +30,7 @@ pub struct PseudoTerminal<T> {
     device: Arc<Mutex<T>>,
     path: String,
     link: Option<PathBuf>,
-    end: Arc<AtomicBool>,
-    thread: Option<thread::JoinHandle<()>>,
+    _thread: OwnThread,
 }
 
 impl<T: FarEnd> PseudoTerminal<T> {
@@ -53,17 +53,13 @@ impl<T: FarEnd> PseudoTerminal<T> {
         if let Some(link) = link {
             std::os::unix::fs::symlink(&path, link)?;
         }
-        let end = Arc::new(AtomicBool::new(false));
-        let (ended, answering) = (Arc::clone(&end), Arc::clone(&device));
-        let thread = thread::Builder::new()
-            .name("far-end".to_owned())
-            .spawn(move || answer(master, &answering, &ended))?;
+        let answering = Arc::clone(&device);
+        let thread = OwnThread::start("far-end", move |end| answer(master, &answering, end))?;
         Ok(Self {
             device,
             path,
             link: link.map(Path::to_owned),
-            end,
-            thread: Some(thread),
+            _thread: thread,
         })
     }
 
@@ -88,10 +84,6 @@ impl<T: FarEnd> PseudoTerminal<T> {
 
 impl<T> Drop for PseudoTerminal<T> {
     fn drop(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
         if let Some(link) = &self.link {
             let _ = std::fs::remove_file(link);
         }

@@ -6,11 +6,12 @@
 
 use std::pin::pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::thread::JoinHandle;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use sd_notify::NotifyState;
+
+use crate::own_thread::OwnThread;
 
 /// Longest time between two looks at the loops.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
@@ -102,8 +103,7 @@ impl Turns {
 /// The thread that tells. When this goes, the manager hears that the service stops.
 #[derive(Debug)]
 pub struct ServiceNotifier {
-    over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: OwnThread,
 }
 
 impl ServiceNotifier {
@@ -116,35 +116,19 @@ impl ServiceNotifier {
         if !is_there() {
             return None;
         }
-        let over = Arc::<AtomicBool>::default();
-        let dropped = over.clone();
-        let thread = std::thread::Builder::new()
-            .name("notify".to_owned())
-            .spawn(move || {
-                let so_far = || turns.each_ref().map(Turns::so_far);
-                run(status, so_far, || {
-                    is_over() || dropped.load(Ordering::Relaxed)
-                });
-                stops();
+        let thread = OwnThread::start("notify", move |dropped| {
+            let so_far = || turns.each_ref().map(Turns::so_far);
+            run(status, so_far, || {
+                is_over() || dropped.load(Ordering::Relaxed)
             });
+            stops();
+        });
         match thread {
-            Ok(thread) => Some(Self {
-                over,
-                thread: Some(thread),
-            }),
+            Ok(thread) => Some(Self { _thread: thread }),
             Err(error) => {
                 tracing::warn!("the service manager will not be told that this runs: {error}");
                 None
             }
-        }
-    }
-}
-
-impl Drop for ServiceNotifier {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // it tells and does nothing else
         }
     }
 }

@@ -5,10 +5,11 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
 
 use nalgebra::Isometry3;
-use taut_bridge::{BridgeArgs, BridgeError, Device, LedDevice, Placement, Target, run_device};
+use taut_bridge::{
+    BridgeArgs, BridgeError, Device, LedDevice, OwnThread, Placement, Target, run_device,
+};
 
 use crate::cli::RenderArgs;
 use crate::error::RenderError;
@@ -22,8 +23,7 @@ type Targets = Arc<Mutex<triple_buffer::Input<Target>>>;
 pub(crate) struct Hand {
     pub(crate) hold: Hold,
     targets: Targets,
-    stop: Arc<AtomicBool>,
-    thread: Option<thread::JoinHandle<()>>,
+    _thread: OwnThread,
 }
 
 impl Hand {
@@ -43,17 +43,15 @@ impl Hand {
         bridge.give_up = args.membership.give_up;
         let (input, _) = triple_buffer::TripleBuffer::new(&target(hold.target(), 0)).split();
         let targets = Targets::new(Mutex::new(input));
-        let stop = Arc::new(AtomicBool::new(false));
-        let (asked, there) = (Arc::clone(&stop), Arc::clone(&targets));
-        let thread = thread::Builder::new()
-            .name("taut-hand".to_owned())
-            .spawn(move || be_the_device(&bridge, &asked, &there))
-            .map_err(|error| system(error.to_string()))?;
+        let there = Arc::clone(&targets);
+        let thread = OwnThread::start("taut-hand", move |asked| {
+            be_the_device(&bridge, asked, &there);
+        })
+        .map_err(|error| system(error.to_string()))?;
         Ok(Self {
             hold,
             targets,
-            stop,
-            thread: Some(thread),
+            _thread: thread,
         })
     }
 
@@ -67,16 +65,6 @@ impl Hand {
     pub(crate) fn follow(&mut self, stage: &Stage, buttons: u16) {
         self.hold.follow(Hold::new(stage));
         self.lead(buttons);
-    }
-}
-
-impl Drop for Hand {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // If it broke down, it has said so.
-            let _ = thread.join();
-        }
     }
 }
 
@@ -117,6 +105,7 @@ fn target(pose: &Isometry3<f64>, buttons: u16) -> Target {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::thread;
     use std::time::{Duration, Instant};
 
     use clap::Parser;

@@ -7,9 +7,8 @@
 
 use std::fmt::Write as _;
 use std::net::{TcpStream, ToSocketAddrs};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::Duration;
 
 use serde::Deserialize;
@@ -17,6 +16,7 @@ use taut_kinds::ServiceAddress;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Message, WebSocket};
 
+use crate::own_thread::OwnThread;
 use crate::realtime::monotonic_now;
 
 /// The service's own port for them.
@@ -133,8 +133,7 @@ impl LineLimit {
 
 /// The thread that listens. Dropping it ends it.
 pub(crate) struct ServiceEvents {
-    end: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: OwnThread,
 }
 
 impl ServiceEvents {
@@ -152,24 +151,8 @@ impl ServiceEvents {
             host: host.to_owned(),
             port,
         };
-        let end = Arc::new(AtomicBool::new(false));
-        let is_over = Arc::clone(&end);
-        let thread = thread::Builder::new()
-            .name("taut-haply-events".to_owned())
-            .spawn(move || run(&address, &is_over, &tell))?;
-        Ok(Self {
-            end,
-            thread: Some(thread),
-        })
-    }
-}
-
-impl Drop for ServiceEvents {
-    fn drop(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+        let thread = OwnThread::start("taut-haply-events", move |end| run(&address, end, &tell))?;
+        Ok(Self { _thread: thread })
     }
 }
 

@@ -10,6 +10,7 @@ use std::time::Duration;
 use tungstenite::Message;
 
 use super::simulated::SimulatedInverse;
+use crate::own_thread::OwnThread;
 use crate::realtime::monotonic_now;
 
 /// How often a thread that waits looks for the end.
@@ -28,12 +29,11 @@ const VERSION: &str = r#"{"build_time":"","git_branch":"","git_describe":"","git
 pub struct HaplyService {
     shared: Arc<Shared>,
     address: SocketAddr,
-    thread: Option<JoinHandle<()>>,
+    _thread: OwnThread,
 }
 
 struct Shared {
     inverse: Mutex<SimulatedInverse>,
-    end: AtomicBool,
     /// Does not answer, as a service that hangs.
     mute: AtomicBool,
     sessions: AtomicU64,
@@ -79,20 +79,19 @@ impl HaplyService {
         let address = listener.local_addr()?;
         let shared = Arc::new(Shared {
             inverse: Mutex::new(inverse),
-            end: AtomicBool::new(false),
             mute: AtomicBool::new(false),
             sessions: AtomicU64::new(0),
             connections: AtomicU64::new(0),
             version: version.to_owned(),
         });
         let listening = Arc::clone(&shared);
-        let thread = thread::Builder::new()
-            .name("haply-service".to_owned())
-            .spawn(move || listen(&listener, &listening))?;
+        let thread = OwnThread::start("haply-service", move |end| {
+            listen(&listener, &listening, end);
+        })?;
         Ok(Self {
             shared,
             address,
-            thread: Some(thread),
+            _thread: thread,
         })
     }
 
@@ -127,28 +126,15 @@ impl HaplyService {
     }
 }
 
-impl Drop for HaplyService {
-    fn drop(&mut self) {
-        self.shared.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
 impl Shared {
     fn inverse(&self) -> MutexGuard<'_, SimulatedInverse> {
         self.inverse.lock().unwrap_or_else(PoisonError::into_inner)
     }
-
-    fn is_over(&self) -> bool {
-        self.end.load(Ordering::Relaxed)
-    }
 }
 
-fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
+fn listen(listener: &TcpListener, shared: &Arc<Shared>, end: &Arc<AtomicBool>) {
     let mut threads = Vec::new();
-    while !shared.is_over() {
+    while !end.load(Ordering::Relaxed) {
         let Ok((stream, _)) = listener.accept() else {
             thread::sleep(LOOK);
             continue;
@@ -157,13 +143,13 @@ fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
         if shared.connections.load(Ordering::Relaxed) >= MAX_CONNECTIONS {
             continue;
         }
-        let its = Arc::clone(shared);
+        let (its, ended) = (Arc::clone(shared), Arc::clone(end));
         shared.connections.fetch_add(1, Ordering::Relaxed);
         let thread = thread::Builder::new()
             .name("haply-session".to_owned())
             .spawn(move || {
                 // Whatever ends a connection, its force goes with it.
-                let _ = serve(stream, &its);
+                let _ = serve(stream, &its, &ended);
                 its.connections.fetch_sub(1, Ordering::Relaxed);
             });
         threads.extend(thread);
@@ -173,7 +159,11 @@ fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
     }
 }
 
-fn serve(stream: TcpStream, shared: &Shared) -> Result<(), Box<tungstenite::Error>> {
+fn serve(
+    stream: TcpStream,
+    shared: &Shared,
+    end: &AtomicBool,
+) -> Result<(), Box<tungstenite::Error>> {
     let io = |error: std::io::Error| Box::new(tungstenite::Error::Io(error));
     stream.set_nonblocking(false).map_err(io)?;
     stream.set_nodelay(true).map_err(io)?;
@@ -189,7 +179,7 @@ fn serve(stream: TcpStream, shared: &Shared) -> Result<(), Box<tungstenite::Erro
     let greeting = shared.inverse().inventory(monotonic_now(), session);
     let mut outcome = socket.send(Message::text(greeting)).map_err(Box::new);
     while outcome.is_ok() {
-        if shared.is_over() {
+        if end.load(Ordering::Relaxed) {
             break;
         }
         match socket.read() {

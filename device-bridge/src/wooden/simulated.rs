@@ -2,9 +2,8 @@
 
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread;
 use std::time::Duration;
 
 use nalgebra::Vector3;
@@ -13,6 +12,7 @@ use taut_plant::{Hand, MinJerkPath, Tremor};
 use super::kinematics::WoodenModel;
 use super::report::{BoardReport, HostReport};
 use crate::devices::held_arm::{HeldArm, led_through};
+use crate::own_thread::OwnThread;
 use crate::realtime::monotonic_now;
 use crate::simulated_place::make_room;
 
@@ -132,8 +132,7 @@ impl SimulatedWooden {
 pub struct WoodenService {
     arm: Arc<Mutex<SimulatedWooden>>,
     path: PathBuf,
-    end: Arc<AtomicBool>,
-    thread: Option<thread::JoinHandle<()>>,
+    _thread: OwnThread,
 }
 
 impl WoodenService {
@@ -145,30 +144,26 @@ impl WoodenService {
         make_room(path)?;
         let socket = UnixDatagram::bind(path)?;
         socket.set_read_timeout(Some(LOOK))?;
-        let end = Arc::new(AtomicBool::new(false));
-        let (ended, its) = (Arc::clone(&end), Arc::clone(&arm));
-        let thread = thread::Builder::new()
-            .name("wooden-board".to_owned())
-            .spawn(move || {
-                let mut report = [0; 64];
-                while !ended.load(Ordering::Relaxed) {
-                    let Ok((bytes, host)) = socket.recv_from(&mut report) else {
-                        continue; // nothing for a moment
-                    };
-                    let answer = its
-                        .lock()
-                        .unwrap_or_else(PoisonError::into_inner)
-                        .take(monotonic_now(), &report[..bytes]);
-                    if let Some(host) = host.as_pathname() {
-                        let _ = socket.send_to(&answer, host); // a host that is gone hears nothing
-                    }
+        let its = Arc::clone(&arm);
+        let thread = OwnThread::start("wooden-board", move |end| {
+            let mut report = [0; 64];
+            while !end.load(Ordering::Relaxed) {
+                let Ok((bytes, host)) = socket.recv_from(&mut report) else {
+                    continue; // nothing for a moment
+                };
+                let answer = its
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .take(monotonic_now(), &report[..bytes]);
+                if let Some(host) = host.as_pathname() {
+                    let _ = socket.send_to(&answer, host); // a host that is gone hears nothing
                 }
-            })?;
+            }
+        })?;
         Ok(Self {
             arm,
             path: path.to_owned(),
-            end,
-            thread: Some(thread),
+            _thread: thread,
         })
     }
 
@@ -180,10 +175,6 @@ impl WoodenService {
 
 impl Drop for WoodenService {
     fn drop(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
         let _ = std::fs::remove_file(&self.path);
     }
 }

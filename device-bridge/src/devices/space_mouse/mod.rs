@@ -6,7 +6,6 @@
 mod report;
 mod source;
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
@@ -19,6 +18,7 @@ pub use source::{HidPort, MODELS, Model, ReportPort, ReportSource, SourceError};
 
 use super::rate_control::{CapSettings, RateControl};
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
+use crate::own_thread::OwnThread;
 use crate::placement::Placement;
 
 /// How long one wait for a report lasts; the end of the program waits no longer.
@@ -47,12 +47,7 @@ pub struct SpaceMouse {
     was_open: bool,
     wrench: Vector6<f64>,
     /// Ends the thread when it is dropped.
-    _reader: Reader,
-}
-
-struct Reader {
-    end: Arc<AtomicBool>,
-    thread: Option<thread::JoinHandle<()>>,
+    _reader: OwnThread,
 }
 
 impl SpaceMouse {
@@ -79,12 +74,10 @@ impl SpaceMouse {
             ..Newest::default()
         };
         let (output, newest) = triple_buffer::TripleBuffer::new(&first).split();
-        let end = Arc::new(AtomicBool::new(false));
-        let ended = Arc::clone(&end);
-        let thread = thread::Builder::new()
-            .name("taut-spacemouse".to_owned())
-            .spawn(move || read_reports(port, source, output, &ended))
-            .map_err(|error| SourceError::Gone(error.to_string()))?;
+        let reader = OwnThread::start("taut-spacemouse", move |end| {
+            read_reports(port, source, output, end);
+        })
+        .map_err(|error| SourceError::Gone(error.to_string()))?;
         Ok(Self {
             info,
             body: RateControl::new(settings, placement),
@@ -92,10 +85,7 @@ impl SpaceMouse {
             seen: (0, Duration::ZERO),
             was_open: true,
             wrench: Vector6::zeros(),
-            _reader: Reader {
-                end,
-                thread: Some(thread),
-            },
+            _reader: reader,
         })
     }
 }
@@ -141,16 +131,6 @@ impl Device for SpaceMouse {
     /// Nobody feels the wrench; the body yields to it.
     fn write(&mut self, _now: Duration, wrench: &Vector6<f64>) {
         self.wrench = *wrench;
-    }
-}
-
-impl Drop for Reader {
-    fn drop(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // It panics nowhere; if it did, there would be nothing left to end.
-            let _ = thread.join();
-        }
     }
 }
 
