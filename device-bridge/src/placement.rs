@@ -4,7 +4,7 @@
 //! **workbench** frame (x right, y away from the viewer, z up), and this maps it to the **world** frame of the
 //! simulation, which may be turned and drawn larger.
 
-use nalgebra::{Isometry3, Point3, Similarity3, Vector3};
+use nalgebra::{Isometry3, Point3, Similarity3, UnitQuaternion, Vector3};
 use taut_link::proto::SceneDescription;
 
 use crate::device::Pose;
@@ -79,6 +79,17 @@ impl Placement {
         )
     }
 
+    /// Where a body is that was at `body` when something on the workbench was at `from`, and has moved as that has, to `to`.
+    #[must_use]
+    pub fn carried(&self, body: &Pose, from: &Pose, to: &Pose) -> Pose {
+        let travel = to.translation.vector - from.translation.vector;
+        let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
+        Isometry3::from_parts(
+            (body.translation.vector + self.vector_in_world(&travel)).into(),
+            UnitQuaternion::from_scaled_axis(self.rotation_in_world(&turn)) * body.rotation,
+        )
+    }
+
     /// World from a frame at G, parallel to the body's, of a body whose own frame is at `pose`.
     #[must_use]
     pub fn at_reference_point(&self, pose: &Pose) -> Pose {
@@ -96,7 +107,6 @@ impl Placement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::UnitQuaternion;
 
     fn placement() -> Placement {
         let origin = Isometry3::new(Vector3::new(0.1, -0.4, 0.3), Vector3::z() * 0.7);

@@ -30,6 +30,6 @@ pub use intention::REACTION_TIME;
 pub use min_jerk::{MinJerkPath, PathError, Progress, ViaPoint, min_jerk};
 pub use motors::{MAX_PENDING, Motors};
 pub use plant::Plant;
-pub use spatial::{Pose, is_finite, stack};
+pub use spatial::{Pose, displaced, is_finite, stack};
 pub use strings::{StringAnchors, string_inertia};
 pub use tremor::{Tremor, TremorMotion};

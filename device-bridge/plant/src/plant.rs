@@ -15,7 +15,7 @@
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 use crate::coulomb::friction;
 use crate::encoder::Encoder;
@@ -25,7 +25,7 @@ use crate::hand::Hand;
 use crate::intention::Intention;
 use crate::min_jerk::MinJerkPath;
 use crate::motors::{DelayLine, Motors};
-use crate::spatial::{Pose, stack};
+use crate::spatial::{Pose, displaced, stack};
 use crate::tremor::Tremor;
 
 /// Longest step unless [`Plant::with_longest_step`] says otherwise: a tenth of a 1 kHz tick, for hands that move.
@@ -264,11 +264,9 @@ impl Plant {
                 moved[axis] = 0.0; // it stood, and stands
             }
         }
+        let travel: Vector3<f64> = moved.fixed_rows::<3>(0).into();
         let turn: Vector3<f64> = moved.fixed_rows::<3>(3).into();
-        let mut rotation = UnitQuaternion::from_scaled_axis(turn) * self.pose.rotation;
-        rotation.renormalize_fast();
-        let position = self.pose.translation.vector + moved.fixed_rows::<3>(0);
-        self.pose = Isometry3::from_parts(position.into(), rotation);
+        self.pose = displaced(&self.pose, &travel, &turn);
     }
 
     /// The wrench that moves grip and hand in free space by the tremor's displacement.

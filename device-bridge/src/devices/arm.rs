@@ -11,7 +11,7 @@
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Vector3, Vector6};
 use taut_plant::stack;
 use taut_vrpn::{PoseReport, SensorMapping};
 
@@ -150,13 +150,7 @@ impl ArmDevice {
         }
         let start = self.placement.at_reference_point(&self.placement.start);
         let (cursor_then, body_then) = *self.anchored.get_or_insert((*cursor, start));
-        let travel = cursor.translation.vector - cursor_then.translation.vector;
-        let turn = (cursor.rotation * cursor_then.rotation.inverse()).scaled_axis();
-        let turn = self.placement.rotation_in_world(&turn);
-        Isometry3::from_parts(
-            (body_then.translation.vector + self.placement.vector_in_world(&travel)).into(),
-            UnitQuaternion::from_scaled_axis(turn) * body_then.rotation,
-        )
+        self.placement.carried(&body_then, &cursor_then, cursor)
     }
 
     fn take(&mut self, now: Duration, state: &ArmState) -> Result<(), DeviceFault> {

@@ -9,8 +9,8 @@
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
-use taut_plant::stack;
+use nalgebra::{Vector3, Vector6};
+use taut_plant::{displaced, stack};
 
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 use crate::placement::Placement;
@@ -93,12 +93,7 @@ impl Device for LedDevice {
         } else {
             (Vector3::zeros(), Vector3::zeros())
         };
-        let turn = UnitQuaternion::from_scaled_axis(angular * passed);
-        self.pose = Isometry3::from_parts(
-            (self.pose.translation.vector + linear * passed).into(),
-            turn * self.pose.rotation,
-        );
-        self.pose.rotation.renormalize_fast();
+        self.pose = displaced(&self.pose, &(linear * passed), &(angular * passed));
         Ok(DeviceSample {
             time: now,
             pose: self.placement.from_reference_point(&self.pose),

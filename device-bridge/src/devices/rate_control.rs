@@ -16,8 +16,8 @@
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
-use taut_plant::stack;
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
+use taut_plant::{displaced, stack};
 
 use crate::device::Pose;
 use crate::placement::Placement;
@@ -149,12 +149,7 @@ impl RateControl {
             linear += wrench.fixed_rows::<3>(0) * (speed * slower / yield_force);
             angular += wrench.fixed_rows::<3>(3) * (turn_rate / yield_torque);
         }
-        let turn = UnitQuaternion::from_scaled_axis(angular * passed);
-        self.pose = Isometry3::from_parts(
-            (self.pose.translation.vector + linear * passed).into(),
-            turn * self.pose.rotation,
-        );
-        self.pose.rotation.renormalize_fast();
+        self.pose = displaced(&self.pose, &(linear * passed), &(angular * passed));
         self.velocity = stack(&linear, &angular);
     }
 

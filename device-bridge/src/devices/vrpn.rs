@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Vector6;
 use taut_vrpn::SensorMapping;
 
 use super::glide::Glide;
@@ -127,14 +127,7 @@ impl VrpnDevice {
         let (sensor_then, body_then) = *self
             .anchored
             .get_or_insert_with(|| (*sensor, glide.at(now).0));
-        let travel = sensor.translation.vector - sensor_then.translation.vector;
-        let turn = (sensor.rotation * sensor_then.rotation.inverse()).scaled_axis();
-        let travel = self.placement.vector_in_world(&travel);
-        let turn = self.placement.rotation_in_world(&turn);
-        Isometry3::from_parts(
-            (body_then.translation.vector + travel).into(),
-            nalgebra::UnitQuaternion::from_scaled_axis(turn) * body_then.rotation,
-        )
+        self.placement.carried(&body_then, &sensor_then, sensor)
     }
 
     fn lose(&mut self, fault: DeviceFault) -> DeviceFault {
