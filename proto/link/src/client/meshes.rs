@@ -1,7 +1,7 @@
 //! Meshes and panoramas by hash: from memory, from the cache on disk, or from the server on a stream of their own; checked against their hash, and kept
 //! for the next who asks, in this session or in a later one.
 
-use super::mesh_cache::MeshCache;
+use super::{inbound::lock, mesh_cache::MeshCache};
 use crate::{
     LinkError, MeshCounters,
     counters::MeshCounterCells,
@@ -10,7 +10,7 @@ use crate::{
 use quinn::Connection;
 use std::{
     collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex},
 };
 use taut_cache::Cached;
 use taut_proto::{
@@ -51,7 +51,7 @@ impl Meshes {
             let bodies = std::iter::once(&description.god_object).chain(&description.obstacles);
             bodies.into_iter().any(|body| body.mesh == *hash)
         };
-        self.lock().retain(|hash, _| named(hash));
+        lock(&self.known).retain(|hash, _| named(hash));
     }
 
     /// The mesh of `hash`, from here or from the server.
@@ -62,12 +62,12 @@ impl Meshes {
         server: &str,
         hash: MeshHash,
     ) -> Result<Arc<MeshBlob>, LinkError> {
-        if let Some(mesh) = self.lock().get(&hash) {
+        if let Some(mesh) = lock(&self.known).get(&hash) {
             return Ok(mesh.clone());
         }
         let mesh = self.load(connection, version, server, hash, MeshBlob::decode);
         let mesh = Arc::new(mesh.await?);
-        self.lock().insert(hash, mesh.clone());
+        lock(&self.known).insert(hash, mesh.clone());
         Ok(mesh)
     }
 
@@ -153,10 +153,6 @@ impl Meshes {
             tracing::warn!("mesh {hash} cannot be kept in the cache ({error}); going on without");
         }
         Ok(mesh)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, HashMap<MeshHash, Arc<MeshBlob>>> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

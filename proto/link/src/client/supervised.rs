@@ -4,12 +4,15 @@
 //! * Writer: the supervising task. Reader: the owner's loop, which asks once per turn and never waits for more than the copy of a pointer.
 //! * The owner keeps the lost session until there is a new one: its clock goes on, so that the age of the last state can be told.
 
-use super::{ClientLink, ClientOptions, LinkHealth, LinkWatch, RejoinPolicy, Rejoiner, SessionEnd};
+use super::{
+    ClientLink, ClientOptions, LinkHealth, LinkWatch, RejoinPolicy, Rejoiner, SessionEnd,
+    inbound::lock,
+};
 use crate::LinkError;
 use std::{
     fmt::Display,
     future::Future,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex},
     time::{Duration, Instant},
 };
 use taut_proto::membership::Liveness;
@@ -110,10 +113,6 @@ impl<T> Drop for SupervisedLink<T> {
     fn drop(&mut self) {
         self.task.abort();
     }
-}
-
-fn lock<T>(slot: &Mutex<T>) -> MutexGuard<'_, T> {
-    slot.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Watches, and brings sessions, until it is over.
