@@ -335,7 +335,8 @@ fn drain(socket: &mut Socket) -> Result<(), Lost> {
     drained
 }
 
-fn is_late(error: &std::io::Error) -> bool {
+/// Nothing came within the time of a read.
+pub(super) fn is_late(error: &std::io::Error) -> bool {
     matches!(
         error.kind(),
         std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut

@@ -16,6 +16,7 @@ use taut_kinds::ServiceAddress;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Message, WebSocket};
 
+use super::client::is_late;
 use crate::own_thread::OwnThread;
 use crate::realtime::monotonic_now;
 
@@ -210,14 +211,7 @@ fn hear(
             Ok(Message::Text(text)) => text,
             Ok(Message::Close(_)) => return,
             Ok(_) => continue,
-            Err(tungstenite::Error::Io(error))
-                if matches!(
-                    error.kind(),
-                    std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
-                ) =>
-            {
-                continue;
-            }
+            Err(tungstenite::Error::Io(error)) if is_late(&error) => continue,
             Err(_) => return, // a message that is too long, too
         };
         let Some(event) = ServiceEvent::parse(&text) else {

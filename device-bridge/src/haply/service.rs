@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use tungstenite::Message;
 
+use super::client::is_late;
 use super::simulated::SimulatedInverse;
 use crate::own_thread::OwnThread;
 use crate::realtime::monotonic_now;
@@ -194,11 +195,7 @@ fn serve(
             }
             Ok(Message::Close(_)) => break,
             Ok(_) => {}
-            Err(tungstenite::Error::Io(error))
-                if matches!(
-                    error.kind(),
-                    std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
-                ) => {}
+            Err(tungstenite::Error::Io(error)) if is_late(&error) => {}
             Err(error) => outcome = Err(Box::new(error)),
         }
     }

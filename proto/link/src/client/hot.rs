@@ -340,11 +340,7 @@ impl Hot {
             }
             match socket.recv(&mut buffer) {
                 Ok(length) => self.receive(&buffer[..length], Instant::now()),
-                Err(error)
-                    if matches!(
-                        error.kind(),
-                        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
-                    ) => {}
+                Err(error) if nothing_came(&error) => {}
                 // A datagram bounced, or a signal came: soft, but no reason to spin.
                 Err(_) => std::thread::sleep(SHORTEST_WAIT),
             }
@@ -401,4 +397,12 @@ impl Rhythm {
     fn left(&self, now: Instant) -> Duration {
         self.next.saturating_duration_since(now)
     }
+}
+
+/// Nothing came within the time of a receive.
+pub(super) fn nothing_came(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
+    )
 }

@@ -1,6 +1,6 @@
 //! States from the group: a thread that listens, and tells the server whether it hears.
 
-use super::hot::Hot;
+use super::hot::{Hot, nothing_came};
 use crate::multicast::{interface_to, join_again, listener};
 use socket2::Socket;
 use std::{
@@ -56,11 +56,7 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
                     watch.heard(hot.inbound.local_ns(now));
                 }
             }
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
-                ) => {}
+            Err(error) if nothing_came(&error) => {}
             Err(_) => std::thread::sleep(LOOK_PERIOD), // soft, but no reason to spin
         }
         let now = Instant::now();
