@@ -86,6 +86,18 @@ pub struct DeviceInfo {
 }
 
 impl DeviceInfo {
+    /// Of a device that measures a whole pose and renders no force.
+    #[must_use]
+    pub fn without_force(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            sensed_degrees_of_freedom: 6,
+            actuated_degrees_of_freedom: 0,
+            limits: DeviceLimits::UNLIMITED,
+            rate_hz: 1000.0,
+        }
+    }
+
     /// What to tell a user once of a device that pushes and cannot turn; `None` for every other.
     #[must_use]
     pub fn renders_no_torque(&self) -> Option<String> {

@@ -12,7 +12,7 @@ use std::time::Duration;
 use nalgebra::{Vector3, Vector6};
 use taut_plant::{displaced, stack};
 
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Pose};
 use crate::placement::Placement;
 
 /// tau: two frames of a slow window.
@@ -48,13 +48,7 @@ impl LedDevice {
     #[must_use]
     pub fn new(name: &str, targets: triple_buffer::Output<Target>, placement: Placement) -> Self {
         Self {
-            info: DeviceInfo {
-                name: name.to_owned(),
-                sensed_degrees_of_freedom: 6,
-                actuated_degrees_of_freedom: 0,
-                limits: DeviceLimits::UNLIMITED,
-                rate_hz: 1000.0,
-            },
+            info: DeviceInfo::without_force(name),
             targets,
             placement,
             pose: placement.at_reference_point(&placement.start),

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector6};
 
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Pose};
 use taut_plant::{is_finite, stack};
 use taut_recording::TraceSample;
 
@@ -77,15 +77,8 @@ impl RecordedDevice {
                 return Err(TraceError::TimeNotIncreasing { row });
             }
         }
-        let info = DeviceInfo {
-            name: "recorded trace".to_owned(),
-            sensed_degrees_of_freedom: 6,
-            actuated_degrees_of_freedom: 0,
-            limits: DeviceLimits::UNLIMITED,
-            rate_hz: 1000.0,
-        };
         Ok(Self {
-            info,
+            info: DeviceInfo::without_force("recorded trace"),
             trace,
             at_end,
             reference_point,

@@ -10,7 +10,7 @@ use nalgebra::Vector6;
 use taut_vrpn::SensorMapping;
 
 use super::glide::Glide;
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Pose};
 use crate::placement::Placement;
 use crate::vrpn::{TrackerFeed, TrackerState, VrpnSource};
 
@@ -95,15 +95,9 @@ impl VrpnDevice {
         settings: &VrpnSettings,
         placement: Placement,
     ) -> Self {
-        let info = DeviceInfo {
-            name: format!("VRPN tracker {}", settings.source.address),
-            sensed_degrees_of_freedom: 6,
-            actuated_degrees_of_freedom: 0,
-            limits: DeviceLimits::UNLIMITED,
-            rate_hz: 1000.0,
-        };
+        let name = format!("VRPN tracker {}", settings.source.address);
         Self {
-            info,
+            info: DeviceInfo::without_force(name),
             reader,
             mapping: settings.mapping,
             anchor: settings.anchor,

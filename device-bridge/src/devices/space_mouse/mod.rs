@@ -17,7 +17,7 @@ use source::MAX_REPORT_BYTES;
 pub use source::{HidPort, MODELS, Model, ReportPort, ReportSource, SourceError};
 
 use super::rate_control::{CapSettings, RateControl};
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample};
 use crate::own_thread::OwnThread;
 use crate::placement::Placement;
 
@@ -62,13 +62,7 @@ impl SpaceMouse {
     ) -> Result<Self, SourceError> {
         let source = port.open()?;
         tracing::info!("reading {}", source.name());
-        let info = DeviceInfo {
-            name: source.name().to_owned(),
-            sensed_degrees_of_freedom: 6,
-            actuated_degrees_of_freedom: 0,
-            limits: DeviceLimits::UNLIMITED,
-            rate_hz: 1000.0,
-        };
+        let info = DeviceInfo::without_force(source.name());
         let first = Newest {
             is_open: true,
             ..Newest::default()
