@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use taut_bridge::OwnThread;
 use taut_link::Transport;
 use taut_proto::version::MAGIC;
 use tokio::runtime::Runtime;
@@ -270,10 +271,9 @@ fn flood(
 
 /// A client process that is stopped most of the time.
 struct Stalled {
-    /// Held: killed when this is dropped, after the thread that signals it has ended.
+    /// Signals the process; first, so that it ends before that is killed.
+    _thread: OwnThread,
     _process: Process,
-    stop: Arc<AtomicBool>,
-    thread: Option<std::thread::JoinHandle<()>>,
 }
 
 impl Stalled {
@@ -286,9 +286,7 @@ impl Stalled {
     ) -> Result<Stalled, BenchError> {
         let process = start_client(this, server, key, node, transport)?;
         let id = process.id();
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = stop.clone();
-        let run = move || {
+        let thread = OwnThread::start("stall", move |stopped| {
             use rustix::process::{Signal, kill_process};
             while !stopped.load(Ordering::Relaxed) {
                 let _ = kill_process(id, Signal::STOP);
@@ -296,23 +294,10 @@ impl Stalled {
                 let _ = kill_process(id, Signal::CONT);
                 std::thread::sleep(BREATH);
             }
-        };
-        let thread = std::thread::Builder::new()
-            .name("stall".to_owned())
-            .spawn(run)?;
+        })?;
         Ok(Stalled {
+            _thread: thread,
             _process: process,
-            stop,
-            thread: Some(thread),
         })
-    }
-}
-
-impl Drop for Stalled {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
     }
 }

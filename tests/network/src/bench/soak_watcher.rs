@@ -3,9 +3,9 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, mpsc};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use taut_bridge::OwnThread;
 use taut_link::{
     ClientLink, ClientOptions, FrameTurn, LinkError, ReceivedState, RejoinPolicy, Renewal,
     SupervisedLink,
@@ -36,11 +36,11 @@ pub(super) type Restarts = Arc<AtomicU64>;
 
 /// The node; leaves when dropped.
 pub(super) struct Watcher {
+    /// First, so that it ends before its runtime does. What it found, it has sent.
+    _thread: OwnThread,
     runtime: Option<Runtime>,
-    stop: Arc<AtomicBool>,
     states: Arc<AtomicU64>,
     felt: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
 }
 
 impl Watcher {
@@ -59,10 +59,7 @@ impl Watcher {
         let prepare = |_: Arc<ClientLink>| async { Ok::<(), LinkError>(()) };
         let joined = SupervisedLink::join(options, policy, prepare);
         let (supervised, link, ()) = runtime.block_on(joined)?;
-        let (stop, states) = (
-            Arc::new(AtomicBool::new(false)),
-            Arc::<AtomicU64>::default(),
-        );
+        let states = Arc::<AtomicU64>::default();
         let felt = Arc::new(AtomicBool::new(false));
         let look = Look {
             name: name.clone(),
@@ -75,16 +72,15 @@ impl Watcher {
             settled_ns: None,
             event: None,
         };
-        let (over, count) = (stop.clone(), states.clone());
-        let thread = std::thread::Builder::new()
-            .name(name)
-            .spawn(move || watch(&supervised, link, look, &over, &count))?;
+        let count = states.clone();
+        let thread = OwnThread::start(&name, move |over| {
+            watch(&supervised, link, look, over, &count);
+        })?;
         Ok(Watcher {
+            _thread: thread,
             runtime: Some(runtime),
-            stop,
             states,
             felt,
-            thread: Some(thread),
         })
     }
 
@@ -102,15 +98,6 @@ impl Watcher {
     pub(super) fn vanish(mut self) {
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();
-        }
-    }
-}
-
-impl Drop for Watcher {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // what it found, it has sent
         }
     }
 }
