@@ -32,6 +32,13 @@ pub enum RealtimeGrant {
 }
 
 impl RealtimeGrant {
+    fn of(what: String, asked: Result<(), String>) -> Self {
+        match asked {
+            Ok(()) => Self::Granted { what },
+            Err(why) => Self::Waived { what, why },
+        }
+    }
+
     /// True when the request was granted.
     #[must_use]
     pub fn is_granted(&self) -> bool {
@@ -63,13 +70,9 @@ pub fn sleep_until(deadline: Duration) {
 /// Asks for the first-in-first-out real-time class at `priority` (1 to 99) for this thread.
 pub fn request_fifo(priority: u8) -> RealtimeGrant {
     let what = format!("SCHED_FIFO priority {priority}");
-    os::request_fifo(priority).map_or_else(
-        |why| RealtimeGrant::Waived {
-            what: what.clone(),
-            why: format!("{why}; run as root, or grant it: `ulimit -r 99` or LimitRTPRIO=99 in the service unit"),
-        },
-        |()| RealtimeGrant::Granted { what: what.clone() },
-    )
+    let advice = "run as root, or grant it: `ulimit -r 99` or LimitRTPRIO=99 in the service unit";
+    let asked = os::request_fifo(priority).map_err(|why| format!("{why}; {advice}"));
+    RealtimeGrant::of(what, asked)
 }
 
 /// Leaves the real-time class, which a thread inherits from the one that started it.
@@ -81,13 +84,9 @@ pub(crate) fn leave_fifo() {
 /// Asks to keep all memory of this process in RAM, now and later.
 pub fn lock_memory() -> RealtimeGrant {
     let what = "locked memory".to_owned();
-    os::lock_memory().map_or_else(
-        |why| RealtimeGrant::Waived {
-            what: what.clone(),
-            why: format!("{why}; grant it: `ulimit -l unlimited` or LimitMEMLOCK=infinity in the service unit"),
-        },
-        |()| RealtimeGrant::Granted { what: what.clone() },
-    )
+    let advice = "grant it: `ulimit -l unlimited` or LimitMEMLOCK=infinity in the service unit";
+    let asked = os::lock_memory().map_err(|why| format!("{why}; {advice}"));
+    RealtimeGrant::of(what, asked)
 }
 
 /// Whether this process may lock any amount of memory; it locks none.
@@ -99,26 +98,16 @@ pub fn may_lock_memory() -> bool {
 /// Asks to run this thread on one core only, counted from 0.
 pub fn pin_to_core(core: usize) -> RealtimeGrant {
     let what = format!("core {core}");
-    os::pin_to_core(core).map_or_else(
-        |why| RealtimeGrant::Waived {
-            what: what.clone(),
-            why: format!("{why}; name a core that this process may use"),
-        },
-        |()| RealtimeGrant::Granted { what: what.clone() },
-    )
+    let advice = "name a core that this process may use";
+    let asked = os::pin_to_core(core).map_err(|why| format!("{why}; {advice}"));
+    RealtimeGrant::of(what, asked)
 }
 
 /// Asks that sleeps of this thread end within a microsecond of their deadline, where the normal class
 /// allows 50 us. Without effect, and without harm, in the real-time class.
 pub fn sharpen_timers() -> RealtimeGrant {
     let what = "timer slack of 1 ns".to_owned();
-    os::sharpen_timers().map_or_else(
-        |why| RealtimeGrant::Waived {
-            what: what.clone(),
-            why,
-        },
-        |()| RealtimeGrant::Granted { what: what.clone() },
-    )
+    RealtimeGrant::of(what, os::sharpen_timers())
 }
 
 #[cfg(target_os = "linux")]
