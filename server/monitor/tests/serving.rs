@@ -24,19 +24,21 @@ fn host_of(url: &str) -> &str {
 }
 
 fn request(host: &str, path: &str, origin: &str) -> String {
-    let mut connection = TcpStream::connect(host).unwrap();
+    let headers =
+        format!("Host: {host}\r\nOrigin: {origin}\r\nAccess-Control-Request-Method: POST\r\n");
+    answer(host, &format!("OPTIONS {path} HTTP/1.1\r\n{headers}")).to_lowercase()
+}
+
+/// What comes back for a head that is not ended yet.
+fn answer(address: &str, head: &str) -> String {
+    let mut connection = TcpStream::connect(address).unwrap();
     connection
         .set_read_timeout(Some(Duration::from_secs(60)))
         .unwrap();
-    write!(
-        connection,
-        "OPTIONS {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: {origin}\r\n\
-         Access-Control-Request-Method: POST\r\nConnection: close\r\n\r\n"
-    )
-    .unwrap();
+    write!(connection, "{head}Connection: close\r\n\r\n").unwrap();
     let mut answer = Vec::new();
     connection.read_to_end(&mut answer).unwrap();
-    String::from_utf8_lossy(&answer).to_lowercase()
+    String::from_utf8_lossy(&answer).into_owned()
 }
 
 #[test]
@@ -95,19 +97,12 @@ fn the_page_opens_the_stream_and_both_end_with_the_monitor() {
 
 /// Status of an answer to what a browser would send.
 fn status(address: &str, method: &str, path: &str, headers: &str) -> String {
-    let mut connection = TcpStream::connect(address).unwrap();
-    connection
-        .set_read_timeout(Some(Duration::from_secs(20)))
-        .unwrap();
-    write!(
-        connection,
-        "{method} {path} HTTP/1.1\r\n{headers}Content-Length: 0\r\nConnection: close\r\n\r\n"
-    )
-    .unwrap();
-    let mut answer = Vec::new();
-    connection.read_to_end(&mut answer).unwrap();
-    let answer = String::from_utf8_lossy(&answer);
-    answer.split(' ').nth(1).unwrap_or_default().to_owned()
+    let head = format!("{method} {path} HTTP/1.1\r\n{headers}Content-Length: 0\r\n");
+    answer(address, &head)
+        .split(' ')
+        .nth(1)
+        .unwrap_or_default()
+        .to_owned()
 }
 
 #[test]
