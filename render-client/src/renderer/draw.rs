@@ -1,14 +1,13 @@
-//! Puts the drawn things together: once per state the instances, and the shadow map where it changed; then each
-//! picture of each screen.
+//! Puts the drawn things together: each picture of each screen, from what the state asks to be drawn ([`Renderer::set_state`]).
 
 mod corrected;
+mod state;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Receiver;
 use std::sync::{Mutex, PoisonError};
 
-use nalgebra::{Isometry3, Point3};
-use taut_proto::scene::Show;
+use nalgebra::Point3;
 
 use super::anaglyph::Anaglyph;
 use super::environment::EnvironmentMap;
@@ -22,14 +21,13 @@ use super::pipelines::Pipelines;
 use super::resources::buffer;
 use super::shadow::ShadowMap;
 use super::warp::WarpPipeline;
-use super::{contacts, force, ghost, god_object, obstacles, shapes};
+use super::{contacts, god_object, shapes};
 use crate::comfort::Comfort;
 use crate::detail::{Detail, UNSEEN_PIXELS, made_beside};
 use crate::hud::Overlay;
 use crate::normals::{Shaded, shade};
 use crate::stage::{Bounds, Stage, StageBody, TriangleMesh};
 use crate::stereo::Picture;
-use crate::timeline::{Latched, State};
 use crate::view::{ClipPlanes, Eye, Eyes, Magnification, Screen};
 
 /// Everything on the graphics card that does not depend on the size of a picture.
@@ -206,104 +204,6 @@ impl Renderer {
         self.shadow_passes
     }
 
-    /// Takes the state that the next submission draws; draws its shadow map if a shadow moved.
-    pub fn set_state(&mut self, gpu: &Gpu, stage: &Stage, latched: &Latched, show: Show) {
-        self.take_levels(gpu, |levels| levels.try_recv().ok());
-        let state = &latched.state;
-        let mut list = InstanceList::default();
-        let (mut casters, mut translucent) = (Vec::new(), Vec::new());
-        let mut bounds = self.bounds(stage, &stage.god_object, &state.god_object);
-        let radius = bounds.radius;
-        let scale = stage.workbench_from_scene.scaling();
-        let mut add = |body: &StageBody, instance, own| {
-            let batch = list.batch(body.mesh, [instance], own, body.scale * scale);
-            if body.opacity >= 1.0 {
-                casters.push(batch);
-            } else if body.opacity > 0.0 {
-                translucent.push(batch);
-            }
-        };
-        let god_object = god_object::instance(stage, &state.god_object);
-        add(&stage.god_object, god_object, bounds);
-        let moving = usize::from(stage.god_object.opacity >= 1.0);
-        for body in stage.obstacles.iter().filter(|body| body.opacity > 0.0) {
-            let pose = pose_of(body, state);
-            let own = self.bounds(stage, body, pose);
-            bounds = bounds.union(&own);
-            add(body, obstacles::instance(stage, body, pose), own);
-        }
-
-        let (dot, arrow) = (self.meshes.len() - 2, self.meshes.len() - 1);
-        let mut marks = Vec::new();
-        if show.contacts {
-            let dots = contacts::instances(stage, &state.contacts, radius);
-            marks.push(list.batch(dot, dots, bounds, 1.0));
-        }
-        if show.force {
-            let pose = &state.god_object;
-            let mark = force::instance(stage, pose, &state.force, &self.god_object_box, radius);
-            marks.push(list.batch(arrow, mark, bounds, 1.0));
-        }
-        let ghost = show.ghost.then(|| {
-            let body = &stage.god_object;
-            let own = self.bounds(stage, body, &state.device);
-            let instance = ghost::instance(stage, &state.device);
-            list.batch(body.mesh, [instance], own, body.scale * scale)
-        });
-
-        self.plan = Plan {
-            light: KeyLight::fit(&bounds, ShadowMap::TEXELS),
-            stale: latched.stale,
-            reflections: show.reflections,
-            casters,
-            moving,
-            translucent,
-            marks,
-            ghost,
-        };
-        gpu.queue
-            .write_buffer(&self.instances, 0, bytemuck::cast_slice(&list.instances));
-        let (held, standing) = self.plan.casters.split_at(moving);
-        let of = |batches: &[Batch]| {
-            let instances = batches.iter().flat_map(|batch| batch.instances.clone());
-            instances.map(|i| list.instances[i as usize]).collect()
-        };
-        let shadowed = Shadowed {
-            light: self.plan.light,
-            moving: of(held),
-            standing: of(standing),
-        };
-        self.draw_shadow(gpu, shadowed);
-    }
-
-    /// Brings the shadow map up to date: what stands only if it or the light moved.
-    fn draw_shadow(&mut self, gpu: &Gpu, wanted: Shadowed) {
-        let has = self.shadowed.as_ref();
-        if has == Some(&wanted) {
-            return;
-        }
-        let stands =
-            has.is_some_and(|has| has.light == wanted.light && has.standing == wanted.standing);
-        self.shadow.aim(&gpu.queue, &self.plan.light);
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let (moving, standing) = self.plan.casters.split_at(self.plan.moving);
-        let texels = 1.0 / self.plan.light.texel;
-        let per_metre = |_: &Bounds| texels;
-        if !stands {
-            let mut pass = self.shadow.begin_standing(gpu, &mut encoder);
-            pass.set_vertex_buffer(1, self.instances.slice(..));
-            self.draw_batches(&mut pass, standing, &per_metre);
-            self.shadow_passes += 1;
-        }
-        {
-            let mut pass = self.shadow.begin_moving(gpu, &mut encoder);
-            pass.set_vertex_buffer(1, self.instances.slice(..));
-            self.draw_batches(&mut pass, moving, &per_metre);
-        }
-        gpu.queue.submit([encoder.finish()]);
-        self.shadowed = Some(wanted);
-    }
-
     /// Draws one picture of one screen to `target`.
     pub fn draw(
         &self,
@@ -440,46 +340,10 @@ impl Renderer {
             self.triangles.fetch_add(drawn, Ordering::Relaxed);
         }
     }
-
-    fn bounds(&self, stage: &Stage, body: &StageBody, pose: &Isometry3<f64>) -> Bounds {
-        stage.body_bounds(body, pose, &self.mesh_bounds[body.mesh])
-    }
 }
 
 fn ordered(mesh: &TriangleMesh) -> Shaded {
     shade(mesh).in_drawing_order()
-}
-
-/// Instances of one frame, in the order of the buffer.
-#[derive(Default)]
-struct InstanceList {
-    instances: Vec<Instance>,
-}
-
-impl InstanceList {
-    fn batch(
-        &mut self,
-        mesh: usize,
-        instances: impl IntoIterator<Item = Instance>,
-        bounds: Bounds,
-        scale: f64,
-    ) -> Batch {
-        let first = self.instances.len() as u32;
-        self.instances.extend(instances);
-        let instances = first..self.instances.len() as u32;
-        Batch {
-            mesh,
-            instances,
-            bounds,
-            scale,
-        }
-    }
-}
-
-/// Where a body is: where the state says, else where the scene put it.
-fn pose_of<'a>(body: &'a StageBody, state: &'a State) -> &'a Isometry3<f64> {
-    let moved = state.bodies.iter().find(|(id, _)| *id == body.id);
-    moved.map_or(&body.pose, |(_, pose)| pose)
 }
 
 /// The obstacles that are seen; the god-object where there are none.
