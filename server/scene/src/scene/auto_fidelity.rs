@@ -4,7 +4,7 @@ use god_object::spatial::{angular, linear, pose_difference};
 use god_object::{ForceShading, Mesh, Primitive, Settings, Surface};
 use nalgebra::{Point3, Vector3};
 
-use super::build::BuiltMotion;
+use super::built::BuiltMotion;
 use super::load::Scene;
 use super::spec::{MassSpec, ReferencePoint, Shape};
 use crate::fidelity::decide::Parts;

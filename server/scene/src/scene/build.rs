@@ -4,25 +4,21 @@ use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 use god_object::geometry::mass_properties;
-use god_object::spatial::{advance_pose, pose_difference};
 use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Settings, Texture, World};
-use nalgebra::{Matrix3, Point3, Vector3};
-use taut_plant::HandPreset;
-use taut_proto::Panorama;
+use nalgebra::{Matrix3, Vector3};
 
 use super::auto_fidelity::AutoFidelity;
+use super::built::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
 use super::load::{Scene, unusable};
-use super::spec::{MassSpec, ObstacleSpec, ReferencePoint, Shape, View};
+use super::spec::{MassSpec, ObstacleSpec, ReferencePoint, Shape};
 use crate::appearance::Appearance;
 use crate::check::MeshFigures;
 use crate::document::At;
-use crate::fidelity::FidelityPlan;
 use crate::mesh_file::{FileLook, RawMesh};
 use crate::problem::{FileError, Problem};
 use crate::progress::Progress;
 use crate::shapes;
 use crate::simplify::{Simplified, simplify};
-use crate::trace::DeviceTrace;
 
 /// Masses of a body that a hand may hold, kg: the stiffness goes with them, and beyond these no number of the coupling means anything.
 const MASSES: RangeInclusive<f64> = 1e-6..=1e6;
@@ -31,100 +27,6 @@ const MASSES: RangeInclusive<f64> = 1e-6..=1e6;
 const DRAWN_SUBDIVISIONS: u32 = 4;
 const DRAWN_MERIDIANS: usize = 48;
 const DRAWN_SIDES: usize = 72;
-
-/// The god-object's name among the bodies.
-pub const GOD_OBJECT_NAME: &str = "god-object";
-
-/// A body as it is drawn.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BuiltBody {
-    /// `god-object`, or the name of the obstacle or scenery.
-    pub name: String,
-    /// Vertices and triangles in the body's own frame.
-    pub mesh: RawMesh,
-    /// World from body, at the start.
-    pub pose: Pose,
-    /// How it looks: what the scene says, else its mesh file.
-    pub appearance: Appearance,
-}
-
-/// How an obstacle moves.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BuiltMotion {
-    /// Index of the obstacle in the world.
-    pub obstacle: usize,
-    /// Its poses.
-    pub path: DeviceTrace,
-    /// Begin again at the end; otherwise it stays there.
-    pub repeat: bool,
-}
-
-impl BuiltMotion {
-    /// World from obstacle, `elapsed` seconds after the start of the scene: between two samples a straight line of its origin at constant
-    /// speed and a constant axis and rate of rotation.
-    pub fn pose_at(&self, elapsed: f64) -> Pose {
-        let samples = self.path.samples();
-        let duration = self.path.duration();
-        let within = if self.repeat && duration > 0.0 {
-            elapsed.rem_euclid(duration)
-        } else {
-            elapsed.clamp(0.0, duration)
-        };
-        let time = samples[0].time + within;
-        let next = samples.partition_point(|sample| sample.time <= time);
-        let before = &samples[next.saturating_sub(1)];
-        let Some(after) = samples.get(next) else {
-            return before.pose;
-        };
-        let share = (time - before.time) / (after.time - before.time);
-        let way = pose_difference(&after.pose, &before.pose, &Vector3::zeros());
-        advance_pose(&before.pose, &way, share)
-    }
-}
-
-/// The hand's intention.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BuiltHand {
-    /// Via points.
-    pub path: DeviceTrace,
-    /// Begin again at the end.
-    pub repeat: bool,
-    /// The hand's impedance.
-    pub preset: HandPreset,
-}
-
-/// A scene ready to run.
-#[derive(Clone, Debug)]
-pub struct BuiltScene {
-    /// The scene's name.
-    pub name: String,
-    /// The body in the hand and all that it can touch.
-    pub world: World,
-    /// Gains, limits and lengths: defaults for the body's size, then what the scene says.
-    pub settings: Settings,
-    /// Where the god-object starts.
-    pub start: Pose,
-    /// The hand's intention, if the scene has one.
-    pub hand: Option<BuiltHand>,
-    /// How obstacles move; nothing for those that stand still.
-    pub motions: Vec<BuiltMotion>,
-    /// What is drawn: the god-object first, then the obstacles in order.
-    pub bodies: Vec<BuiltBody>,
-    /// What is drawn besides and never touched: no closed surfaces, maybe.
-    pub scenery: Vec<BuiltBody>,
-    /// What mesh files say of their look and is not drawn: a sentence for each file.
-    pub lost_looks: Vec<String>,
-    /// How meshes were simplified, for each shape that asks for it.
-    pub simplified: Vec<Simplified>,
-    /// How the scene stands on the workbench.
-    pub view: View,
-    /// The light around it; `None` is a studio.
-    pub environment: Option<Panorama>,
-    /// Longest side of the box around the god-object, m.
-    pub size: f64,
-    /// What fidelity was chosen for the scene, if it asks for that.
-    pub fidelity: Option<FidelityPlan>,
-}
 
 impl Scene {
     /// Loads and generates the meshes and checks that the method can work on them. All faults are reported.
@@ -514,16 +416,4 @@ fn drawn(name: &str, mesh: &Mesh, pose: Pose, appearance: Appearance) -> BuiltBo
 /// What a mass adds to the inertia about a point `offset` away (parallel axes).
 fn displaced_inertia(mass: f64, offset: &Vector3<f64>) -> Matrix3<f64> {
     (Matrix3::identity() * offset.norm_squared() - offset * offset.transpose()) * mass
-}
-
-impl BuiltScene {
-    /// The reference point G in the god-object's frame, m.
-    pub fn reference_point(&self) -> Point3<f64> {
-        self.world.body.reference_point
-    }
-
-    /// The translational stiffness that the hand feels, N/m.
-    pub fn stiffness(&self) -> f64 {
-        self.settings.stiffness(self.world.body.mass)
-    }
 }

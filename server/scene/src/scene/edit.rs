@@ -4,7 +4,7 @@ use std::fmt;
 
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
-use super::build::GOD_OBJECT_NAME;
+use super::built::GOD_OBJECT_NAME;
 use super::load::Scene;
 use crate::document::{Section, nearest};
 use crate::files::MAX_TOML_BYTES;

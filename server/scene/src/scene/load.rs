@@ -6,7 +6,7 @@ use std::sync::Arc;
 use god_object::{HeightMapTexture, Mesh, Texture, TextureCoordinates, UvHeightMapTexture};
 use taut_proto::Panorama;
 
-use super::build::GOD_OBJECT_NAME;
+use super::built::GOD_OBJECT_NAME;
 use super::parse::{SceneSpec, parse};
 use super::settings_tables::{CouplingSpec, LimitSpec, MethodSpec};
 use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};

@@ -2,6 +2,7 @@
 
 mod auto_fidelity;
 mod build;
+mod built;
 mod edit;
 mod load;
 mod parse;
@@ -11,7 +12,7 @@ mod settings_tables;
 mod shipped;
 mod spec;
 
-pub use build::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
+pub use built::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
 pub use edit::EditedKey;
 pub(crate) use edit::RESERVED_NAMES;
 pub(crate) use load::mesh_faults;
