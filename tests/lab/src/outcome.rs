@@ -46,8 +46,8 @@ pub struct Trial {
 }
 
 impl Outcome {
-    /// Runs a recipe with the best of the method's tunings: that which is felt least from the phases for [`TRAINING`], and of these the one
-    /// that misses the fewest lines.
+    /// Runs a recipe with the best of the method's tunings: that which misses the fewest lines from the phases for [`TRAINING`], and of these the one
+    /// that is felt least.
     pub fn of(recipe: &Recipe, method: Method, rate: u32) -> Self {
         let tunings = method.tunings();
         let tried: Vec<Self> = match tunings.as_slice() {
@@ -66,7 +66,7 @@ impl Outcome {
         // NaN, where nothing is felt to be compared, is the same for all.
         let best = trials
             .iter()
-            .min_by(|a, b| a.felt.total_cmp(&b.felt).then(a.missed.cmp(&b.missed)))
+            .min_by(|a, b| (a.missed.cmp(&b.missed)).then(a.felt.total_cmp(&b.felt)))
             .map_or(tunings[0], |trial| trial.tuning);
         let mut outcome = Self::tuned(recipe, method, rate, best);
         outcome.trials = trials;
