@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::measure::Measure;
 use crate::method::Method;
 use crate::outcome::Outcome;
 use crate::recipe::Recipe;
@@ -31,6 +32,20 @@ impl Score {
             .count()
     }
 
+    /// How many keep the two lines of what is felt, whatever else they miss.
+    pub fn felt(&self) -> usize {
+        let felt = [Measure::JndP95, Measure::JndShare].map(Measure::key);
+        let kept = |missed: &BTreeSet<_>| felt.iter().all(|line| !missed.contains(line));
+        self.cases.values().filter(|missed| kept(missed)).count()
+    }
+
+    /// How many would be within the budget if bodies might meet: a penalty method has no body that stays outside.
+    pub fn within_where_bodies_may_meet(&self) -> usize {
+        let meeting = [Measure::Intersections, Measure::Penetration].map(Measure::key);
+        let kept = |missed: &BTreeSet<_>| missed.iter().all(|line| meeting.contains(line));
+        self.cases.values().filter(|missed| kept(missed)).count()
+    }
+
     /// Each line that was missed, and in how many cases; the one that most missed comes first.
     pub fn reasons(&self) -> Vec<(&'static str, usize)> {
         let mut reasons = BTreeMap::new();
@@ -42,7 +57,7 @@ impl Score {
         reasons
     }
 
-    /// `n of m common cases within the budget`, the lines that were missed, and the cases that are not by name.
+    /// `n of m common cases within the budget`, how many are by less, the lines that were missed, and the cases that are not by name.
     pub fn headline(&self) -> String {
         let outside: Vec<String> = (self.cases.iter())
             .filter(|(_, missed)| !missed.is_empty())
@@ -57,12 +72,15 @@ impl Score {
             format!("; lines missed, and in how many cases: {reasons}; outside: {outside}")
         };
         format!(
-            "{}, {} Hz asked, at least {:.0} Hz held: {} of {} common cases within the budget{outside}",
+            "{}, {} Hz asked, at least {:.0} Hz held: {} of {} common cases within the budget; by what is felt alone: {}; where bodies may meet: \
+             {}{outside}",
             self.method.name(),
             self.rate,
             self.held,
             self.within(),
-            self.cases.len()
+            self.cases.len(),
+            self.felt(),
+            self.within_where_bodies_may_meet(),
         )
     }
 }
@@ -99,4 +117,38 @@ pub fn scores(recipes: &[&Recipe], outcomes: &[Outcome], methods: &[Method]) -> 
         missed.extend(outcome.missed(recipe));
     }
     scores
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cases_are_counted_by_the_lines_that_they_miss() {
+        let missed = [
+            vec![],
+            vec!["step"],
+            vec!["intersections", "penetration"],
+            vec!["intersections", "j_share_above_1"],
+            vec!["j_p95"],
+        ];
+        let case = |(at, lines): (usize, &Vec<&'static str>)| {
+            let name = ("R00".to_owned(), at.to_string());
+            (name, lines.iter().copied().collect())
+        };
+        let score = Score {
+            method: Method::Penalty,
+            rate: 1000,
+            held: 1000.0,
+            cases: missed.iter().enumerate().map(case).collect(),
+        };
+        let counted = [
+            score.within(),
+            score.felt(),
+            score.within_where_bodies_may_meet(),
+        ];
+        assert_eq!(counted, [1, 3, 2]);
+        let said = "1 of 5 common cases within the budget; by what is felt alone: 3; where bodies may meet: 2; lines missed";
+        assert!(score.headline().contains(said), "{}", score.headline());
+    }
 }
