@@ -52,4 +52,5 @@ pub mod score;
 pub mod store;
 pub mod study;
 pub mod sweeps;
+mod tuning;
 pub mod vertex_depth;

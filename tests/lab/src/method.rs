@@ -1,6 +1,5 @@
 //! What a method has to do to be compared, and which methods there are.
 
-use std::fmt;
 use std::sync::Arc;
 
 use god_object::{Pose, Settings, Vector6, World};
@@ -8,6 +7,8 @@ use god_object::{Pose, Settings, Vector6, World};
 use crate::methods::{
     Control, Discrete, GodObjectMethod, Penalty, PointGodObject, VirtualCoupling,
 };
+use crate::tuning::{DAMPING_RATIOS, PROXY_SHARES, SHELL_SPACINGS, TOUCH_SHARES};
+pub use crate::tuning::{ShellForce, Tuning};
 
 /// How far this project's method looks ahead: as far as the device goes in this many periods. 1/k_s that the body lags behind it, one while
 /// an update is made, and one while it is used.
@@ -16,17 +17,6 @@ const LOOK_AHEAD_PERIODS: f64 = 4.0;
 /// ([`Work`](god_object::collision::Work)).
 const LOOK_AHEAD_SHARE: f64 = 0.1;
 const PAIR_TIME: f64 = 50e-9;
-/// Rest distances that are tried for the paper's method, over the default: a ball on a convex surface loses a contact that is too tight. A ball of
-/// 2 mm that goes round 20 mm at 0.2 m/s and 1 kHz needs 400 of them.
-const TOUCHING: [f64; 4] = [5.0, 25.0, 100.0, 400.0];
-/// Inertias and damping ratios that are tried for virtual coupling.
-const PROXY_SHARES: [f64; 3] = [0.02, 0.005, 0.1];
-const DAMPING_RATIOS: [f64; 2] = [1.0, 0.3];
-
-/// Spacings of the points of the penalty method that are tried, over the body's longest side: an eighth, or the vertices alone.
-const SHELL_SPACINGS: [f64; 2] = [0.125, f64::INFINITY];
-/// Distances within which the point god-object counts faces as touched that are tried, in rest distances.
-const TOUCH_SHARES: [f64; 2] = [2.0, 10.0];
 
 /// A method on its way through a recipe.
 ///
@@ -161,42 +151,10 @@ impl Method {
         }
     }
 
-    /// The settings among which the best is searched for each recipe and rate; the first is the default.
-    pub fn tunings(self) -> Vec<Tuning> {
-        match self {
-            Self::Ours | Self::OursByDefault | Self::DoesNothing | Self::RandomForce => {
-                vec![Tuning::Default]
-            }
-            Self::Paper | Self::PaperAdapted | Self::Discrete => {
-                let touching = TOUCHING.map(Tuning::Touching);
-                [Tuning::Default].into_iter().chain(touching).collect()
-            }
-            Self::Penalty => [ShellForce::Deepest, ShellForce::Mean, ShellForce::Sum]
-                .iter()
-                .flat_map(|force| {
-                    SHELL_SPACINGS.map(|spacing| Tuning::Shell {
-                        force: *force,
-                        spacing,
-                    })
-                })
-                .collect(),
-            Self::Point => TOUCH_SHARES.map(Tuning::Touch).into(),
-            Self::VirtualCoupling => PROXY_SHARES
-                .iter()
-                .flat_map(|share| {
-                    DAMPING_RATIOS.map(|damping_ratio| Tuning::Proxy {
-                        share: *share,
-                        damping_ratio,
-                    })
-                })
-                .collect(),
-        }
-    }
-
     /// The method at the start of a scene, updated every `period` seconds.
     pub fn start(self, scene: &Scene, period: f64, tuning: Tuning) -> Box<dyn HapticMethod> {
         let mut by_default = scene.settings;
-        if let Tuning::Touching(share) = tuning {
+        if let Tuning::Touching(share) | Tuning::Ahead { share, .. } = tuning {
             by_default.rest_distance *= share;
             let least = 2.0 * by_default.rest_distance;
             by_default.activation_distance = by_default.activation_distance.max(least);
@@ -228,7 +186,18 @@ impl Method {
                 };
                 Box::new(VirtualCoupling::new(scene, period, share, damping_ratio))
             }
-            Self::Discrete => Box::new(Discrete::new(scene, &by_default)),
+            Self::Discrete => {
+                let (look_ahead_limit, max_substeps) = match tuning {
+                    Tuning::Ahead { steps, .. } => (scene.fitted(period).look_ahead_limit, steps),
+                    _ => (0.0, 1),
+                };
+                let settings = Settings {
+                    look_ahead_limit,
+                    max_substeps,
+                    ..by_default
+                };
+                Box::new(Discrete::new(scene, &settings))
+            }
             Self::DoesNothing => Box::new(Control::does_nothing(scene)),
             Self::RandomForce => Box::new(Control::random_force(scene)),
             Self::Penalty => {
@@ -245,71 +214,6 @@ impl Method {
                 };
                 Box::new(PointGodObject::new(scene, share))
             }
-        }
-    }
-}
-
-/// What is tuned of a baseline.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Tuning {
-    /// Nothing.
-    Default,
-    /// Rest distance of the paper's god-object, over the default; contacts within two of them touch.
-    Touching(f64),
-    /// The proxy of virtual coupling.
-    Proxy {
-        /// Inertia over that of the body.
-        share: f64,
-        /// Damping over critical damping.
-        damping_ratio: f64,
-    },
-    /// The points of the penalty method.
-    Shell {
-        /// What they add up to.
-        force: ShellForce,
-        /// Between points, over the body's longest side; infinite: the vertices alone.
-        spacing: f64,
-    },
-    /// Distance within which the point god-object counts faces as touched, in rest distances.
-    Touch(f64),
-}
-
-/// What the forces of all points in an obstacle add up to; each is the stiffness times its depth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ShellForce {
-    /// Their sum.
-    Sum,
-    /// Their mean.
-    Mean,
-    /// The deepest alone.
-    Deepest,
-}
-
-impl fmt::Display for Tuning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Default => write!(f, "default"),
-            Self::Shell { force, spacing } => {
-                let force = match force {
-                    ShellForce::Sum => "sum",
-                    ShellForce::Mean => "mean",
-                    ShellForce::Deepest => "deepest",
-                };
-                if spacing.is_finite() {
-                    write!(f, "{force} of points; spacing {spacing} of the body")
-                } else {
-                    write!(f, "{force} of vertices")
-                }
-            }
-            Self::Touch(share) => write!(f, "touching within {share} rest distances"),
-            Self::Touching(share) => write!(f, "{share} rest distances"),
-            Self::Proxy {
-                share,
-                damping_ratio,
-            } => write!(
-                f,
-                "proxy {share} of the body; damping ratio {damping_ratio}"
-            ),
         }
     }
 }

@@ -257,7 +257,7 @@ mod tests {
             .collect();
         let outcomes: Vec<Outcome> = recipes
             .iter()
-            .flat_map(|recipe| [Method::Ours, Method::Discrete].map(|m| Outcome::of(recipe, m, 70)))
+            .flat_map(|recipe| [Method::Ours, Method::Penalty].map(|m| Outcome::of(recipe, m, 70)))
             .collect();
         let rows: Vec<Row> = outcomes
             .iter()
@@ -270,7 +270,7 @@ mod tests {
             (found[0].cases, found[0].passed),
             (recipes.len(), recipes.len())
         );
-        assert!(found[1].passed < found[1].cases, "discrete pops through");
+        assert!(found[1].passed < found[1].cases, "penalty pops through");
         assert_eq!(csv(&found).lines().count(), 3);
         assert!(svg(&found).expect("a picture").contains("cases passed"));
     }

@@ -24,7 +24,7 @@ fn plan(sweeps: Vec<Sweep>) -> Plan {
     Plan {
         extent: Extent::Quick,
         recipes: Some(vec!["R03".into(), "R09".into(), "R10b".into()]),
-        methods: vec![Method::Ours, Method::Discrete],
+        methods: vec![Method::Ours, Method::Penalty],
         sweeps,
         maps: false,
         threads: 2,
@@ -73,7 +73,7 @@ fn the_page_stands_alone_and_has_every_case_point_and_miss() {
     assert!(dots >= points.filter(|point| !point.error.is_nan()).count());
     assert!(
         results.rows.iter().any(|row| row.verdict == Verdict::Fail),
-        "discrete pops through"
+        "penalty pops through"
     );
     for name in [
         "processor",
@@ -89,8 +89,8 @@ fn the_page_stands_alone_and_has_every_case_point_and_miss() {
     let rows = text(&folder.path().join("rows.csv"));
     let first = rows
         .lines()
-        .position(|line| line.starts_with("R09") && line.contains("discrete"));
-    let first = first.expect("discrete was run") + 1;
+        .position(|line| line.starts_with("R09") && line.contains("penalty"));
+    let first = first.expect("penalty was run") + 1;
     assert!(page.contains(&format!("lines {first} to ")), "line {first}");
 }
 
@@ -137,7 +137,7 @@ fn failures_that_the_page_predicts_are_seen() {
     }
 }
 
-/// A trace is what the run was: the one of discrete detection loses the plate that ours is held by, at the limit of the force.
+/// A trace is what the run was: the one of penalty loses the plate that ours is held by, at the limit of the force.
 #[test]
 fn a_trace_shows_the_fall_through_the_plate() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -156,15 +156,14 @@ fn a_trace_shows_the_fall_through_the_plate() {
         let value = line.rsplit(',').next().expect("a last column");
         value.parse().expect("a number")
     };
-    let (right, ours, discrete) = (last("right answer"), last("ours"), last("discrete"));
+    let (right, ours, penalty) = (last("right answer"), last("ours"), last("penalty"));
     assert!(
         (ours - right).abs() <= 1e-6 * right,
         "{ours} N, not {right} N"
     );
-    assert!(discrete.abs() < 0.1 * right, "{discrete} N: it is through");
+    assert!(penalty.abs() < 0.1 * right, "{penalty} N: it is through");
     // And the headline names the line that it misses.
-    let its =
-        |score: &&taut_lab::score::Score| score.method == Method::Discrete && score.rate == 70;
+    let its = |score: &&taut_lab::score::Score| score.method == Method::Penalty && score.rate == 70;
     let score = results.scores.iter().find(its).expect("it was run");
     assert!(score.headline().contains("astray"), "{}", score.headline());
     let page = text(&folder.path().join("report.html"));

@@ -1,9 +1,10 @@
 //! A god-object with discrete collision detection: the poses between the start and the end of a step are not looked at.
 //!
 //! Projection and force are those of the god-object method; contacts have gaps. The motion differs: the body goes
-//! where the projection leads if it is free there, else as far as bisection finds it free, once an update. A step that is longer
-//! than body and obstacle are thick can lead through. Contacts are those within the activation distance: there is no look-ahead, so a faster device
-//! meets them late.
+//! where the projection leads if it is free there, else as far as bisection finds it free. A step that is longer
+//! than body and obstacle are thick can lead through. Settings say how often this is repeated within an update, with the contacts of where the body
+//! is then ([`Settings::max_substeps`]), and how far beyond the activation distance contacts are looked for at most
+//! ([`Settings::look_ahead_limit`]): as far as body and device may go until the next update is there.
 
 use std::sync::Arc;
 
@@ -18,6 +19,9 @@ use nalgebra::{Point3, Vector3};
 use super::contacts::{ContactFinder, constraint_set, free_share, project};
 use crate::method::{HapticMethod, Scene};
 
+/// A set is used from one period after its device pose to two: the device goes on as it came.
+const PERIODS_AHEAD: f64 = 2.0;
+
 /// The method's state.
 #[derive(Debug)]
 pub struct Discrete {
@@ -27,6 +31,8 @@ pub struct Discrete {
     radius: f64,
     pose: Pose,
     turn: Vector3<f64>,
+    /// At the last update, of the reference point.
+    last_device: Option<Pose>,
     finder: ContactFinder,
     contacts: Vec<Contact>,
     rows: Vec<HalfSpace>,
@@ -51,6 +57,7 @@ impl Discrete {
             radius: body.mesh.radius_about(&body.reference_point),
             pose: scene.start,
             turn: Vector3::zeros(),
+            last_device: None,
             finder: ContactFinder::new(&settings),
             contacts: Vec::with_capacity(capacity),
             rows: Vec::with_capacity(capacity),
@@ -59,47 +66,83 @@ impl Discrete {
             set: ConstraintSet::with_capacity(capacity),
             published: ConstraintSet::with_capacity(capacity),
         };
-        method.collect(0);
+        method.collect(0, 0.0);
         method.publish(0.0);
         method
     }
 
-    fn collect(&mut self, sequence: u64) {
+    /// Contacts within the activation distance and so much more, m, up to the limit.
+    fn collect(&mut self, sequence: u64, ahead: f64) {
         let (world, settings) = (&self.world, &self.settings);
-        let found = (self.finder).find(world, &self.pose, settings.activation_distance);
+        let distance = settings.activation_distance + ahead.min(settings.look_ahead_limit);
+        let found = self.finder.find(world, &self.pose, distance);
         self.contacts.clear();
         self.contacts.extend_from_slice(found);
         self.set = constraint_set(sequence, &self.pose, found, settings.max_constraints);
+    }
+
+    /// Most that a point of the body moves, m.
+    fn length(&self, motion: &Vector6) -> f64 {
+        linear(motion).norm() + self.radius * angular(motion).norm()
+    }
+
+    /// Goes where the contacts lead a motion of the reference point, as far as it is free there. How far the body went, m.
+    fn step(&mut self, wish: &Vector6) -> f64 {
+        let body = &self.world.body;
+        let Some(metric) = body.metric(self.settings.rotation_metric, &self.pose) else {
+            return 0.0;
+        };
+        let start = at_reference_point(&self.pose, &body.reference_point);
+        let centre = Point3::from(start.translation.vector);
+        let rows = (&mut self.projector, &mut self.rows);
+        let contacts = (self.contacts.as_slice(), &centre);
+        let Some(step) = project(rows, &metric, wish, contacts, self.settings.rest_distance) else {
+            return 0.0;
+        };
+        let at = |share: f64| {
+            let pose = advance_pose(&start, &step, share);
+            from_reference_point(&pose, &body.reference_point)
+        };
+        let length = self.length(&step);
+        let free = free_share(&self.world, length, at);
+        if free > 0.0 {
+            self.pose = at(free);
+        }
+        free * length
     }
 }
 
 impl HapticMethod for Discrete {
     fn update(&mut self, _time: f64, device: &Pose) {
-        let body = &self.world.body;
-        let start = at_reference_point(&self.pose, &body.reference_point);
-        let device = at_reference_point(device, &body.reference_point);
+        let reference = self.world.body.reference_point;
+        let start = at_reference_point(&self.pose, &reference);
+        let device = at_reference_point(device, &reference);
+        let last = self.last_device.replace(device).unwrap_or(device);
+        let moved = self.length(&pose_difference(&device, &last, &Vector3::zeros()));
         let difference = pose_difference(&device, &start, &self.turn);
         self.turn = angular(&difference);
-        let Some(metric) = body.metric(self.settings.rotation_metric, &self.pose) else {
-            return;
-        };
+        let sequence = self.set.sequence + 1;
         let wish = difference * self.settings.k_s;
-        let centre = Point3::from(start.translation.vector);
-        let rows = (&mut self.projector, &mut self.rows);
-        let contacts = (self.contacts.as_slice(), &centre);
-        let step = project(rows, &metric, &wish, contacts, self.settings.rest_distance);
-        if let Some(step) = step {
-            let at = |share: f64| {
-                let pose = advance_pose(&start, &step, share);
-                from_reference_point(&pose, &body.reference_point)
-            };
-            let length = linear(&step).norm() + self.radius * angular(&step).norm();
-            let free = free_share(&self.world, length, at);
-            if free > 0.0 {
-                self.pose = at(free);
+        let goal = advance_pose(&start, &wish, 1.0);
+        let (mut left, mut went) = (wish, 0.0);
+        for step in 0..self.settings.max_substeps {
+            if step > 0 {
+                let here = at_reference_point(&self.pose, &reference);
+                left = pose_difference(&goal, &here, &angular(&left));
+                self.collect(sequence, self.length(&left));
+            }
+            let way = self.step(&left);
+            went += way;
+            if way <= self.settings.motion_tolerance {
+                break;
             }
         }
-        self.collect(self.set.sequence + 1);
+        // This update covers a share of what is free: the next ones go on.
+        let share = self.settings.k_s;
+        self.collect(
+            sequence,
+            PERIODS_AHEAD * moved + went * (1.0 - share) / share,
+        );
     }
 
     fn publish(&mut self, _time: f64) {

@@ -53,7 +53,7 @@ const WINDOWS: [Window; 4] = [
         rate: 70,
         from: 0.45,
         to: 0.85,
-        worst: (Method::Discrete, Measure::Astray),
+        worst: (Method::Penalty, Measure::Astray),
         component: (2, "force across the plate, N"),
         about: "is pushed through a thin plate; the force ends at its limit",
     },

@@ -62,7 +62,7 @@ const NOT_ESTABLISHED: [(&str, &str); 3] = [
     ),
     (
         "discrete",
-        "it has no paper: it is this project's method without continuous detection, look-ahead and sub-steps",
+        "it has no paper: it is this project's method without continuous detection; look-ahead and sub-steps are among its tunings",
     ),
 ];
 

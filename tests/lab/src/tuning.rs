@@ -1,0 +1,144 @@
+//! What is tuned of each method, and what is tried.
+
+use std::fmt;
+
+use crate::method::Method;
+
+/// Rest distances that are tried for the paper's method, over the default: a ball on a convex surface loses a contact that is too tight. A ball of
+/// 2 mm that goes round 20 mm at 0.2 m/s and 1 kHz needs 400 of them.
+const TOUCHING: [f64; 4] = [5.0, 25.0, 100.0, 400.0];
+/// Rest distances over the default that discrete detection is tried with while it looks ahead, and steps within an update.
+const TOUCHING_AHEAD: [f64; 3] = [1.0, 25.0, 400.0];
+const STEPS_AHEAD: [u32; 2] = [1, 10];
+/// Inertias and damping ratios that are tried for virtual coupling.
+pub(crate) const PROXY_SHARES: [f64; 3] = [0.02, 0.005, 0.1];
+pub(crate) const DAMPING_RATIOS: [f64; 2] = [1.0, 0.3];
+
+/// Spacings of the points of the penalty method that are tried, over the body's longest side: an eighth, or the vertices alone.
+pub(crate) const SHELL_SPACINGS: [f64; 2] = [0.125, f64::INFINITY];
+/// Distances within which the point god-object counts faces as touched that are tried, in rest distances.
+pub(crate) const TOUCH_SHARES: [f64; 2] = [2.0, 10.0];
+
+impl Method {
+    /// The settings among which the best is searched for each recipe and rate; the first is the default.
+    pub fn tunings(self) -> Vec<Tuning> {
+        match self {
+            Self::Ours | Self::OursByDefault | Self::DoesNothing | Self::RandomForce => {
+                vec![Tuning::Default]
+            }
+            Self::Paper | Self::PaperAdapted => touching().collect(),
+            Self::Discrete => {
+                let ahead = TOUCHING_AHEAD.iter().flat_map(|share| {
+                    STEPS_AHEAD.map(|steps| Tuning::Ahead {
+                        share: *share,
+                        steps,
+                    })
+                });
+                touching().chain(ahead).collect()
+            }
+            Self::Penalty => [ShellForce::Deepest, ShellForce::Mean, ShellForce::Sum]
+                .iter()
+                .flat_map(|force| {
+                    SHELL_SPACINGS.map(|spacing| Tuning::Shell {
+                        force: *force,
+                        spacing,
+                    })
+                })
+                .collect(),
+            Self::Point => TOUCH_SHARES.map(Tuning::Touch).into(),
+            Self::VirtualCoupling => PROXY_SHARES
+                .iter()
+                .flat_map(|share| {
+                    DAMPING_RATIOS.map(|damping_ratio| Tuning::Proxy {
+                        share: *share,
+                        damping_ratio,
+                    })
+                })
+                .collect(),
+        }
+    }
+}
+
+/// Rest distances: the default, and those that are tried.
+fn touching() -> impl Iterator<Item = Tuning> {
+    let others = TOUCHING.map(Tuning::Touching);
+    [Tuning::Default].into_iter().chain(others)
+}
+
+/// What is tuned of a baseline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tuning {
+    /// Nothing.
+    Default,
+    /// Rest distance of the paper's god-object, over the default; contacts within two of them touch.
+    Touching(f64),
+    /// Discrete detection that looks as far ahead as this project's method does.
+    Ahead {
+        /// Rest distance over the default.
+        share: f64,
+        /// Most projections, motions and collections within an update.
+        steps: u32,
+    },
+    /// The proxy of virtual coupling.
+    Proxy {
+        /// Inertia over that of the body.
+        share: f64,
+        /// Damping over critical damping.
+        damping_ratio: f64,
+    },
+    /// The points of the penalty method.
+    Shell {
+        /// What they add up to.
+        force: ShellForce,
+        /// Between points, over the body's longest side; infinite: the vertices alone.
+        spacing: f64,
+    },
+    /// Distance within which the point god-object counts faces as touched, in rest distances.
+    Touch(f64),
+}
+
+/// What the forces of all points in an obstacle add up to; each is the stiffness times its depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShellForce {
+    /// Their sum.
+    Sum,
+    /// Their mean.
+    Mean,
+    /// The deepest alone.
+    Deepest,
+}
+
+impl fmt::Display for Tuning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Default => write!(f, "default"),
+            Self::Shell { force, spacing } => {
+                let force = match force {
+                    ShellForce::Sum => "sum",
+                    ShellForce::Mean => "mean",
+                    ShellForce::Deepest => "deepest",
+                };
+                if spacing.is_finite() {
+                    write!(f, "{force} of points; spacing {spacing} of the body")
+                } else {
+                    write!(f, "{force} of vertices")
+                }
+            }
+            Self::Touch(share) => write!(f, "touching within {share} rest distances"),
+            Self::Touching(share) => write!(f, "{share} rest distances"),
+            Self::Ahead { share, steps } => {
+                write!(
+                    f,
+                    "looks ahead; {share} rest distances; at most {steps} steps"
+                )
+            }
+            Self::Proxy {
+                share,
+                damping_ratio,
+            } => write!(
+                f,
+                "proxy {share} of the body; damping ratio {damping_ratio}"
+            ),
+        }
+    }
+}
