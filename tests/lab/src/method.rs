@@ -200,13 +200,11 @@ impl Method {
             }
             Self::DoesNothing => Box::new(Control::does_nothing(scene)),
             Self::RandomForce => Box::new(Control::random_force(scene)),
-            Self::Penalty => {
-                let (force, spacing) = match tuning {
-                    Tuning::Shell { force, spacing } => (force, spacing),
-                    _ => (ShellForce::Deepest, SHELL_SPACINGS[0]),
-                };
-                Box::new(Penalty::new(scene, force, spacing))
-            }
+            Self::Penalty => Box::new(match tuning {
+                Tuning::Shell { force, spacing } => Penalty::new(scene, force, spacing),
+                Tuning::Round(force) => Penalty::round(scene, force),
+                _ => Penalty::new(scene, ShellForce::Deepest, SHELL_SPACINGS[0]),
+            }),
             Self::Point => {
                 let share = match tuning {
                     Tuning::Touch(share) => share,

@@ -16,6 +16,8 @@ pub(crate) const DAMPING_RATIOS: [f64; 2] = [1.0, 0.3];
 
 /// Spacings of the points of the penalty method that are tried, over the body's longest side: an eighth, or the vertices alone.
 pub(crate) const SHELL_SPACINGS: [f64; 2] = [0.125, f64::INFINITY];
+/// What the forces on a ball add up to that is tried: it may touch several obstacles.
+const ROUND: [ShellForce; 2] = [ShellForce::Deepest, ShellForce::Sum];
 /// Distances within which the point god-object counts faces as touched that are tried, in rest distances.
 pub(crate) const TOUCH_SHARES: [f64; 2] = [2.0, 10.0];
 
@@ -36,7 +38,7 @@ impl Method {
                 });
                 touching().chain(ahead).collect()
             }
-            Self::Penalty => [ShellForce::Deepest, ShellForce::Mean, ShellForce::Sum]
+            Self::Penalty => [ShellForce::Deepest, ShellForce::Mean]
                 .iter()
                 .flat_map(|force| {
                     SHELL_SPACINGS.map(|spacing| Tuning::Shell {
@@ -44,6 +46,7 @@ impl Method {
                         spacing,
                     })
                 })
+                .chain(ROUND.map(Tuning::Round))
                 .collect(),
             Self::Point => TOUCH_SHARES.map(Tuning::Touch).into(),
             Self::VirtualCoupling => PROXY_SHARES
@@ -93,6 +96,8 @@ pub enum Tuning {
         /// Between points, over the body's longest side; infinite: the vertices alone.
         spacing: f64,
     },
+    /// One point with a radius for the penalty method where the body is a ball, and else its vertices: what they add up to.
+    Round(ShellForce),
     /// Distance within which the point god-object counts faces as touched, in rest distances.
     Touch(f64),
 }
@@ -108,22 +113,28 @@ pub enum ShellForce {
     Deepest,
 }
 
+impl fmt::Display for ShellForce {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Sum => "sum",
+            Self::Mean => "mean",
+            Self::Deepest => "deepest",
+        })
+    }
+}
+
 impl fmt::Display for Tuning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Default => write!(f, "default"),
             Self::Shell { force, spacing } => {
-                let force = match force {
-                    ShellForce::Sum => "sum",
-                    ShellForce::Mean => "mean",
-                    ShellForce::Deepest => "deepest",
-                };
                 if spacing.is_finite() {
                     write!(f, "{force} of points; spacing {spacing} of the body")
                 } else {
                     write!(f, "{force} of vertices")
                 }
             }
+            Self::Round(force) => write!(f, "{force} of a ball; else of vertices"),
             Self::Touch(share) => write!(f, "touching within {share} rest distances"),
             Self::Touching(share) => write!(f, "{share} rest distances"),
             Self::Ahead { share, steps } => {

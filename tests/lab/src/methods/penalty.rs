@@ -1,19 +1,50 @@
 //! Penalty on a point shell: the body is where the device is, and every shell point in an obstacle is pushed to the nearest surface.
 //!
 //! The shell is points all over the body, or the vertices of its mesh alone; the field is the exact signed distance, so that no voxel adds an
-//! error.
+//! error. An update finds the points that are in an obstacle, or near enough to be there before the next update is; a force is made of them at the
+//! pose that the device has then, each with the plane that it was nearest to. A ball may stand for its surface: one point with a radius.
 //! There is no history: what is nearer to the far side of a thin obstacle is pushed out there. Source: McNeely et al. 1999, voxmap
-//! point shell, whose voxels and tangent planes the field replaces; the device is coupled directly.
+//! point shell, whose voxels the field replaces; the device is coupled directly.
 
 use std::sync::Arc;
 
-use god_object::spatial::{at_reference_point, six};
+use god_object::shape::{Nearest, Primitive};
+use god_object::spatial::{angular, at_reference_point, linear, pose_difference, six};
 use god_object::{Obstacle, Pose, Settings, Vector6, World};
 use nalgebra::{Point3, Vector3};
 
 use super::contacts::limited;
 use super::shell::{DistanceField, points};
 use crate::method::{HapticMethod, Scene, ShellForce};
+
+/// Points are used from one period after their device pose to two: the device goes on as it came.
+const PERIODS_AHEAD: f64 = 2.0;
+
+/// A point of the shell, or a ball.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Of the body's own frame, m.
+    center: Point3<f64>,
+    /// m.
+    radius: f64,
+}
+
+/// A point of the shell, and the plane of the surface nearest to it.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    place: Place,
+    /// World.
+    on_surface: Point3<f64>,
+    /// Unit, out of the obstacle, world.
+    normal: Vector3<f64>,
+}
+
+/// What the force needs of an update.
+#[derive(Clone, Debug)]
+struct Found {
+    pose: Pose,
+    near: Vec<Near>,
+}
 
 /// The method's state.
 #[derive(Debug)]
@@ -22,11 +53,13 @@ pub struct Penalty {
     settings: Settings,
     stiffness: f64,
     shell_force: ShellForce,
-    shell: Vec<Point3<f64>>,
+    shell: Vec<Place>,
+    /// Of the body about its reference point, m.
+    radius: f64,
     /// Of each obstacle.
     fields: Vec<DistanceField>,
-    now: (Pose, Vector6),
-    published: (Pose, Vector6),
+    now: Found,
+    published: Found,
 }
 
 impl Penalty {
@@ -34,37 +67,60 @@ impl Penalty {
     pub fn new(scene: &Scene, shell_force: ShellForce, spacing: f64) -> Self {
         let mesh = &scene.world.body.mesh;
         let [low, high] = mesh.bounding_box();
+        let points = points(mesh, spacing * (high - low).amax());
+        let place = |center| Place {
+            center,
+            radius: 0.0,
+        };
+        Self::with(scene, shell_force, points.into_iter().map(place).collect())
+    }
+
+    /// The same with one point for a body that is a ball, and with the vertices of any other.
+    pub fn round(scene: &Scene, shell_force: ShellForce) -> Self {
+        match scene.world.body.primitive {
+            Some(Primitive::Sphere { center, radius }) => {
+                Self::with(scene, shell_force, vec![Place { center, radius }])
+            }
+            _ => Self::new(scene, shell_force, f64::INFINITY),
+        }
+    }
+
+    fn with(scene: &Scene, shell_force: ShellForce, shell: Vec<Place>) -> Self {
+        let mesh = &scene.world.body.mesh;
         let obstacles = scene.world.obstacles.iter();
-        let free = (scene.start, Vector6::zeros());
+        let free = Found {
+            pose: scene.start,
+            near: Vec::new(),
+        };
         Self {
             world: scene.world.clone(),
             settings: scene.settings,
             stiffness: scene.stiffness(),
             shell_force,
-            shell: points(mesh, spacing * (high - low).amax()),
+            shell,
+            radius: mesh.radius_about(&scene.world.body.reference_point),
             fields: obstacles.map(|o| DistanceField::new(&o.mesh)).collect(),
-            now: free,
+            now: free.clone(),
             published: free,
         }
     }
 
+    /// What the points found by the last published update come to at a pose.
     fn wrench(&self, device: &Pose) -> Vector6 {
-        let body = &self.world.body;
-        let centre = at_reference_point(device, &body.reference_point).translation;
+        let reference = &self.world.body.reference_point;
+        let centre = at_reference_point(device, reference).translation;
         let (mut sum, mut count) = (Vector6::zeros(), 0_u32);
         let (mut deepest, mut most) = (Vector6::zeros(), 0.0);
-        for place in &self.shell {
-            let point = device * place;
-            for (obstacle, field) in self.world.obstacles.iter().zip(&self.fields) {
-                let Some(out) = way_out(obstacle, field, &point) else {
-                    continue;
-                };
+        for near in &self.published.near {
+            let point = device * near.place.center;
+            let depth = near.place.radius + near.normal.dot(&(near.on_surface - point));
+            if depth > 0.0 {
                 let arm = point.coords - centre.vector;
-                let push = six(&out, &arm.cross(&out)) * self.stiffness;
+                let push = six(&near.normal, &arm.cross(&near.normal)) * (self.stiffness * depth);
                 sum += push;
                 count += 1;
-                if out.norm() > most {
-                    (deepest, most) = (push, out.norm());
+                if depth > most {
+                    (deepest, most) = (push, depth);
                 }
             }
         }
@@ -76,37 +132,113 @@ impl Penalty {
     }
 }
 
-/// From a point in an obstacle to the nearest of its surface, m; `None` outside.
-fn way_out(
+/// The nearest of an obstacle's surface to a point that is inside, or outside and no farther away than `margin`, m; world.
+fn nearest(
     obstacle: &Obstacle,
     field: &DistanceField,
     point: &Point3<f64>,
-) -> Option<Vector3<f64>> {
+    margin: f64,
+) -> Option<Nearest> {
     let local = obstacle.pose.inverse_transform_point(point);
-    let out = match &obstacle.primitive {
-        Some(primitive) => {
-            let nearest = primitive.nearest(&local);
-            (nearest.distance < 0.0).then(|| nearest.normal * -nearest.distance)?
-        }
-        None => field.way_out(&local)?,
-    };
-    Some(obstacle.pose.rotation * out)
+    let found = match &obstacle.primitive {
+        Some(primitive) => Some(primitive.nearest(&local)).filter(|n| n.distance <= margin),
+        None => field.nearest(&local, margin),
+    }?;
+    Some(Nearest {
+        normal: obstacle.pose.rotation * found.normal,
+        ..found
+    })
 }
 
 impl HapticMethod for Penalty {
     fn update(&mut self, _time: f64, device: &Pose) {
-        self.now = (*device, limited(&self.wrench(device), &self.settings));
+        let reference = &self.world.body.reference_point;
+        let [to, from] = [device, &self.now.pose].map(|pose| at_reference_point(pose, reference));
+        let moved = pose_difference(&to, &from, &Vector3::zeros());
+        let moved = linear(&moved).norm() + self.radius * angular(&moved).norm();
+        self.now.pose = *device;
+        self.now.near.clear();
+        for place in &self.shell {
+            let point = device * place.center;
+            let margin = place.radius + PERIODS_AHEAD * moved;
+            for (obstacle, field) in self.world.obstacles.iter().zip(&self.fields) {
+                if let Some(found) = nearest(obstacle, field, &point, margin) {
+                    self.now.near.push(Near {
+                        place: *place,
+                        on_surface: point - found.normal * found.distance,
+                        normal: found.normal,
+                    });
+                }
+            }
+        }
     }
 
     fn publish(&mut self, _time: f64) {
-        self.published = self.now;
+        self.published.clone_from(&self.now);
     }
 
-    fn force(&mut self, _time: f64, _device: &Pose) -> Vector6 {
-        self.published.1
+    fn force(&mut self, _time: f64, device: &Pose) -> Vector6 {
+        limited(&self.wrench(device), &self.settings)
     }
 
     fn pose(&self) -> Pose {
-        self.published.0
+        self.published.pose
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use god_object::Body;
+
+    use super::*;
+    use crate::recipes::{ball, block, cube};
+
+    fn above_a_plate(body: Body) -> Scene {
+        let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
+        let world = World {
+            body,
+            obstacles: vec![plate],
+        };
+        Scene::new(world, 0.01, 0.1, at(0.004))
+    }
+
+    /// The lowest point of a body of 5 mm at a height, m.
+    fn at(height: f64) -> Pose {
+        Pose::translation(0.0, 0.0, 0.005 + height)
+    }
+
+    /// Comes down by 3 mm, to 1 mm above the plate, and is looked at there and deeper without an update.
+    fn is_live(mut method: Penalty, stiffness: f64) {
+        method.update(0.0, &at(0.001));
+        method.publish(0.0);
+        for height in [0.001, 1e-5, -1e-5, -0.001, -0.003] {
+            let force = linear(&method.force(0.0, &at(height)));
+            let right = Vector3::z() * (stiffness * (-height).max(0.0));
+            assert!((force - right).norm() < 1e-9, "{height} m: {force}");
+        }
+    }
+
+    #[test]
+    fn between_updates_the_force_is_of_the_device_and_begins_at_the_surface() {
+        let scene = above_a_plate(cube(0.005));
+        is_live(
+            Penalty::new(&scene, ShellForce::Deepest, 0.125),
+            scene.stiffness(),
+        );
+    }
+
+    #[test]
+    fn a_ball_of_one_point_is_as_round_as_it_is() {
+        let scene = above_a_plate(ball(0.005));
+        is_live(
+            Penalty::round(&scene, ShellForce::Deepest),
+            scene.stiffness(),
+        );
+        // Meshes have no such point: the vertices stand for them.
+        let scene = above_a_plate(cube(0.005));
+        is_live(
+            Penalty::round(&scene, ShellForce::Deepest),
+            scene.stiffness(),
+        );
     }
 }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use god_object::Mesh;
 use god_object::geometry::distance::closest_on_triangle;
 use god_object::geometry::nearest_on_mesh;
+use god_object::shape::Nearest;
 use nalgebra::{Point3, Vector3};
 
 /// Points of a mesh: its vertices, and more on its edges and faces, no farther than `spacing` from each other, m; infinite: none.
@@ -61,17 +62,28 @@ impl DistanceField {
         }
     }
 
-    /// From a point inside to the nearest of the surface, m; `None` outside.
-    pub(super) fn way_out(&self, point: &Point3<f64>) -> Option<Vector3<f64>> {
+    /// The nearest of the surface to a point that is inside, or outside and no farther away than `margin`, m; else `None`.
+    pub(super) fn nearest(&self, point: &Point3<f64>, margin: f64) -> Option<Nearest> {
         let [low, high] = self.mesh.bounding_box();
-        if !(0..3).all(|axis| (low[axis]..high[axis]).contains(&point[axis])) {
+        if !(0..3).all(|axis| (low[axis] - margin..high[axis] + margin).contains(&point[axis])) {
             return None;
         }
-        let t = nearest_on_mesh(&self.mesh, point, 0).triangle;
-        let corners = self.mesh.corners(t);
+        let found = nearest_on_mesh(&self.mesh, point, 0);
+        let corners = self.mesh.corners(found.triangle);
         let nearest = closest_on_triangle(point, &corners).point;
         let out = nearest - point;
-        (self.pseudo_normal(t, &corners, &nearest).dot(&out) > 0.0).then_some(out)
+        let outward = self.pseudo_normal(found.triangle, &corners, &nearest);
+        let inside = outward.dot(&out) > 0.0;
+        if !inside && out.norm() > margin {
+            return None;
+        }
+        let way = if inside { out } else { -out };
+        // On the surface there is no way.
+        let normal = (way.try_normalize(f64::MIN_POSITIVE)).unwrap_or_else(|| outward.normalize());
+        Some(Nearest {
+            normal,
+            distance: -normal.dot(&out),
+        })
     }
 
     /// Of the face, edge or vertex of triangle `t` that `nearest` lies on.
@@ -112,16 +124,27 @@ mod tests {
     use taut_method_tests::solids::{cells, mesh};
     use taut_scene::shapes::{cuboid, sphere};
 
+    /// From a point inside to the nearest of the surface, m; `None` outside.
+    fn way_out(field: &DistanceField, point: Point3<f64>) -> Option<Vector3<f64>> {
+        let found = field.nearest(&point, 0.0)?;
+        (found.distance < 0.0).then(|| found.normal * -found.distance)
+    }
+
     #[test]
     fn the_way_out_is_to_the_nearest_face() {
         let field = DistanceField::new(&mesh(cuboid([0.1, 0.1, 0.01])));
-        let out = |z: f64| field.way_out(&Point3::new(0.02, 0.03, z));
+        let out = |z: f64| way_out(&field, Point3::new(0.02, 0.03, z));
         let up = out(0.007).expect("inside");
         assert!((up - Vector3::z() * 0.003).norm() < 1e-15);
         let down = out(-0.007).expect("inside");
         assert!((down + Vector3::z() * 0.003).norm() < 1e-15);
         assert_eq!(out(0.011), None);
         assert_eq!(out(-0.5), None);
+        let above = Point3::new(0.02, 0.03, 0.012);
+        assert_eq!(field.nearest(&above, 1.9e-3), None);
+        let near = field.nearest(&above, 2.1e-3).expect("near");
+        assert!((near.distance - 2e-3).abs() < 1e-15);
+        assert!((near.normal - Vector3::z()).norm() < 1e-14);
     }
 
     #[test]
@@ -132,8 +155,8 @@ mod tests {
             |[i, _, k]| k == 0 || i != 1,
         )));
         for z in [0.001, 0.05, 0.099] {
-            assert_eq!(field.way_out(&Point3::new(0.01, 0.0, z)), None);
-            let out = field.way_out(&Point3::new(0.022, 0.0, 0.05)).expect("in");
+            assert_eq!(way_out(&field, Point3::new(0.01, 0.0, z)), None);
+            let out = way_out(&field, Point3::new(0.022, 0.0, 0.05)).expect("in");
             assert!((out - Vector3::x() * -0.002).norm() < 1e-15);
         }
     }
