@@ -7,7 +7,7 @@ use god_object::{Pose, Settings, Vector6, World};
 use crate::methods::{
     Control, Discrete, GodObjectMethod, Penalty, PointGodObject, VirtualCoupling,
 };
-use crate::tuning::{DAMPING_RATIOS, PROXY_SHARES, SHELL_SPACINGS, TOUCH_SHARES};
+use crate::tuning::{PROXIES, SHELL_SPACINGS, TOUCH_SHARES};
 pub use crate::tuning::{ShellForce, Tuning};
 
 /// How far this project's method looks ahead: as far as the device goes in this many periods. 1/k_s that the body lags behind it, one while
@@ -177,14 +177,16 @@ impl Method {
                 Box::new(GodObjectMethod::new(scene, &paper))
             }
             Self::VirtualCoupling => {
-                let (share, damping_ratio) = match tuning {
+                let (share, damping_ratio, goes_on) = match tuning {
                     Tuning::Proxy {
                         share,
                         damping_ratio,
-                    } => (share, damping_ratio),
-                    _ => (PROXY_SHARES[0], DAMPING_RATIOS[0]),
+                        goes_on,
+                    } => (share, damping_ratio, goes_on),
+                    _ => (PROXIES[0].0, PROXIES[0].1, false),
                 };
-                Box::new(VirtualCoupling::new(scene, period, share, damping_ratio))
+                let proxy = VirtualCoupling::new(scene, period, share, damping_ratio);
+                Box::new(if goes_on { proxy.going_on() } else { proxy })
             }
             Self::Discrete => {
                 let (look_ahead_limit, max_substeps) = match tuning {

@@ -10,9 +10,15 @@ const TOUCHING: [f64; 4] = [5.0, 25.0, 100.0, 400.0];
 /// Rest distances over the default that discrete detection is tried with while it looks ahead, and steps within an update.
 const TOUCHING_AHEAD: [f64; 3] = [1.0, 25.0, 400.0];
 const STEPS_AHEAD: [u32; 2] = [1, 10];
-/// Inertias and damping ratios that are tried for virtual coupling.
-pub(crate) const PROXY_SHARES: [f64; 3] = [0.02, 0.005, 0.1];
-pub(crate) const DAMPING_RATIOS: [f64; 2] = [1.0, 0.3];
+/// Inertias and damping ratios that are tried for virtual coupling. Less inertia than none there is not: the proxy is where the spring is at rest.
+pub(crate) const PROXIES: [(f64, f64); 6] = [
+    (0.02, 1.0),
+    (0.1, 1.0),
+    (0.1, 0.3),
+    (0.02, 0.1),
+    (0.005, 0.3),
+    (0.0, 0.0),
+];
 
 /// Spacings of the points of the penalty method that are tried, over the body's longest side: an eighth, or the vertices alone.
 pub(crate) const SHELL_SPACINGS: [f64; 2] = [0.125, f64::INFINITY];
@@ -49,12 +55,13 @@ impl Method {
                 .chain(ROUND.map(Tuning::Round))
                 .collect(),
             Self::Point => TOUCH_SHARES.map(Tuning::Touch).into(),
-            Self::VirtualCoupling => PROXY_SHARES
+            Self::VirtualCoupling => PROXIES
                 .iter()
-                .flat_map(|share| {
-                    DAMPING_RATIOS.map(|damping_ratio| Tuning::Proxy {
+                .flat_map(|(share, damping_ratio)| {
+                    [false, true].map(|goes_on| Tuning::Proxy {
                         share: *share,
-                        damping_ratio,
+                        damping_ratio: *damping_ratio,
+                        goes_on,
                     })
                 })
                 .collect(),
@@ -84,10 +91,12 @@ pub enum Tuning {
     },
     /// The proxy of virtual coupling.
     Proxy {
-        /// Inertia over that of the body.
+        /// Inertia over that of the body; 0: it is where the spring is at rest.
         share: f64,
         /// Damping over critical damping.
         damping_ratio: f64,
+        /// Whether it goes on between updates.
+        goes_on: bool,
     },
     /// The points of the penalty method.
     Shell {
@@ -146,10 +155,14 @@ impl fmt::Display for Tuning {
             Self::Proxy {
                 share,
                 damping_ratio,
-            } => write!(
-                f,
-                "proxy {share} of the body; damping ratio {damping_ratio}"
-            ),
+                goes_on,
+            } => {
+                let goes_on = if *goes_on { "; goes on" } else { "" };
+                write!(
+                    f,
+                    "proxy {share} of the body; damping ratio {damping_ratio}{goes_on}"
+                )
+            }
         }
     }
 }

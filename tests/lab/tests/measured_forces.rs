@@ -1,6 +1,6 @@
 //! What is rendered for a person's measured motion, against what was measured of the force.
 
-use taut_lab::method::Method;
+use taut_lab::method::{Method, Tuning};
 use taut_lab::replay::{Choice, SHARES, STIFFNESSES, TARGETS, percentiles, replay};
 
 /// A trial whose contour was registered by another one. All: `taut-lab measured`, docs/laboratory.md.
@@ -8,9 +8,18 @@ const TRIAL: &str = "e_2";
 
 /// The softest spring, and the method's default but for the proxy's damping.
 fn choice(method: Method) -> Choice {
+    let tuning = if method == Method::VirtualCoupling {
+        Tuning::Proxy {
+            share: 0.02,
+            damping_ratio: 0.3,
+            goes_on: false,
+        }
+    } else {
+        method.tunings()[0]
+    };
     Choice {
         stiffness: STIFFNESSES[0],
-        tuning: method.tunings()[usize::from(method == Method::VirtualCoupling)],
+        tuning,
     }
 }
 

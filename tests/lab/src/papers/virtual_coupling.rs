@@ -32,7 +32,7 @@ pub(super) fn figures() -> Vec<Figure> {
     };
     vec![
         figure(
-            "damping of a device that its wall is passive on, over K T / 2 + B, six tunings",
+            "damping of a device that its wall is passive on, over K T / 2 + B, every tuning",
             "1",
             most(HALF, &[FASTEST]),
             1.0 - 1e-6,
@@ -57,6 +57,7 @@ fn bound(tuning: Tuning) -> f64 {
     let Tuning::Proxy {
         share,
         damping_ratio,
+        ..
     } = tuning
     else {
         panic!("{tuning}: not of virtual coupling")
