@@ -7,6 +7,8 @@ use crate::method::Method;
 /// Rest distances that are tried for the paper's method, over the default: a ball on a convex surface loses a contact that is too tight. A ball of
 /// 2 mm that goes round 20 mm at 0.2 m/s and 1 kHz needs 400 of them.
 const TOUCHING: [f64; 4] = [5.0, 25.0, 100.0, 400.0];
+/// One more, for the published method alone.
+const TOUCHING_FARTHEST: f64 = 1600.0;
 /// Rest distances over the default that discrete detection is tried with while it looks ahead, and steps within an update.
 const TOUCHING_AHEAD: [f64; 3] = [1.0, 25.0, 400.0];
 const STEPS_AHEAD: [u32; 2] = [1, 10];
@@ -25,7 +27,7 @@ pub(crate) const SHELL_SPACINGS: [f64; 2] = [0.125, f64::INFINITY];
 /// What the forces on a ball add up to that is tried: it may touch several obstacles.
 const ROUND: [ShellForce; 2] = [ShellForce::Deepest, ShellForce::Sum];
 /// Distances within which the point god-object counts faces as touched that are tried, in rest distances.
-pub(crate) const TOUCH_SHARES: [f64; 2] = [2.0, 10.0];
+pub(crate) const TOUCH_SHARES: [f64; 6] = [2.0, 10.0, 50.0, 250.0, 1000.0, 4000.0];
 
 impl Method {
     /// The settings among which the best is searched for each recipe and rate; the first is the default.
@@ -34,7 +36,10 @@ impl Method {
             Self::Ours | Self::OursByDefault | Self::DoesNothing | Self::RandomForce => {
                 vec![Tuning::Default]
             }
-            Self::Paper | Self::PaperAdapted => touching().collect(),
+            Self::Paper | Self::PaperAdapted => {
+                let farthest = Tuning::Touching(TOUCHING_FARTHEST);
+                touching().chain([farthest]).collect()
+            }
             Self::Discrete => {
                 let ahead = TOUCHING_AHEAD.iter().flat_map(|share| {
                     STEPS_AHEAD.map(|steps| Tuning::Ahead {

@@ -130,7 +130,7 @@ pub(super) fn bunnies(bunnies: &Recipe) -> Vec<Figure> {
 /// What its steps come to: each update goes a share k = `k_s` (1 - d / R) of the angle that is left, for a device that is d behind the surface, and
 /// a force is of a pose 1.5 periods old: (1 / k + 1 / 2) v / (R f). A contact that is lost on the way costs more than that.
 pub(super) fn behind(cylinder: &Recipe) -> Figure {
-    let tuning = Method::Paper.tunings().pop().expect("it has several");
+    let tuning = Tuning::Touching(400.0);
     let start = || Method::Paper.start(&cylinder.scene, 1.0 / f64::from(RATE), tuning);
     let measured = Measured::of(cylinder, RATE, &judged(1), None, start);
     let share = cylinder.scene.settings.k_s * (1.0 - DEEP / RADIUS);
