@@ -122,9 +122,6 @@ impl GodObject {
         let all = self.place().is_some_and(|at| {
             let surfaces = self.surfaces(None);
             reduction.set_surfaces(&at, &surfaces);
-            let forecast = difference + self.device_step;
-            let continued = |way: &Vector6| self.continued(way, reach);
-            reduction.meet_corners((&at, &surfaces), &forecast, continued, work);
             reduction.take_all((&at, &surfaces)) && !reduction.was_given_up()
         });
         self.reduction = Some(reduction);
@@ -134,21 +131,10 @@ impl GodObject {
                 self.complete_for(&[*difference], Purpose::ForceThen, work);
             }
         }
-        if let Some(mut reduction) = self.reduction.take() {
-            if let Some(at) = self.place() {
-                reduction.forget_corners((&at, &self.surfaces(None)));
-            }
+        if let Some(reduction) = &mut self.reduction {
             reduction.retire();
-            self.reduction = Some(reduction);
         }
         self.write_set();
-    }
-
-    /// A way that goes on as it began, by `further`, m.
-    fn continued(&self, way: &Vector6, further: f64) -> Vector6 {
-        let share = further / self.motion_length(way);
-        // No way goes nowhere.
-        way * (1.0 + if share.is_finite() { share } else { 0.0 })
     }
 
     /// Where the device may be next: where it is, and as far as it reaches along and about each axis.
