@@ -59,13 +59,13 @@ impl GodObject {
 
     /// Of the obstacles that may reach the body, the nearest one that takes it along: what slides past it is often nearer than what holds it.
     fn nearest_that_takes_along(&mut self, report: &mut StepReport) -> Option<PlacedObstacle> {
-        let mut leave_it = ArrayVec::<PlacedObstacle, MAX_ASKED>::new();
-        while !leave_it.is_full() {
-            let mover = self.nearest_moving_obstacle(&leave_it)?;
+        let mut asked = ArrayVec::<PlacedObstacle, MAX_ASKED>::new();
+        while !asked.is_full() {
+            let mover = self.nearest_moving_obstacle(&asked)?;
             if self.is_taken_along(&mover, report) {
                 return Some(mover);
             }
-            leave_it.push(mover);
+            asked.push(mover);
         }
         None
     }
