@@ -29,6 +29,7 @@ mod moving_friction_variants;
 mod moving_half_spaces;
 mod moving_obstacles;
 mod no_alloc_steps;
+mod passing_corners;
 mod projection_agreement;
 mod projection_hard_cases;
 mod projection_no_alloc;

@@ -21,7 +21,7 @@ use crate::spatial::{Pose, Vector6, six};
 pub struct NonPenetrationConstraint {
     /// The persistent id: which features face each other.
     pub features: FeaturePair,
-    /// Contact point on the obstacle, world, m.
+    /// Contact point on the obstacle, world, m. Where a corner would meet a face that it is not over yet: on the plane of that face.
     pub point: Point3<f64>,
     /// Unit normal, from the obstacle to the god-object, world.
     pub normal: Vector3<f64>,

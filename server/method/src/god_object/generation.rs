@@ -43,27 +43,23 @@ impl GodObject {
     /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
     /// collected last do not reach as far. False where every pair becomes a row.
     pub(super) fn refresh(&mut self, distance: f64, work: &mut Work) -> bool {
-        let Some(mut reduction) = self.reduction.take() else {
-            return false;
-        };
-        if let Some(at) = self.place() {
-            let stopped = self.stopped.take();
+        self.with_reduction(|this, reduction, at| {
+            let stopped = this.stopped.take();
             let witness = stopped.and_then(|index| {
-                let witnesses = &self.collision.memories[index].witnesses;
+                let witnesses = &this.collision.memories[index].witnesses;
                 witnesses.first().map(|pair| (index, *pair))
             });
-            reduction.move_to((&at, &self.surfaces(None)), witness, work);
-            let (moved, within) = (reduction.moved(self.radius), reduction.served());
+            reduction.move_to((at, &this.surfaces(None)), witness, work);
+            let (moved, within) = (reduction.moved(this.radius), reduction.served());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;
-            self.set.gap_min = reduction.gap_min(&at, work).min(self.given.gap_min);
+            this.set.gap_min = reduction.gap_min(at, work).min(this.given.gap_min);
             if !reaches || reduction.is_outdated() {
-                self.collect_candidates(&mut reduction, &at, distance, work);
+                this.collect_candidates(reduction, at, distance, work);
             }
-        }
-        self.reduction = Some(reduction);
+        });
         self.write_set();
-        true
+        self.reduction.is_some()
     }
 
     /// Finds the rows that the projection of `unconstrained` needs.
@@ -71,20 +67,12 @@ impl GodObject {
         let motion = [*unconstrained];
         self.complete_for(&motion, Purpose::Motion, &mut report.work);
         if self.reduction.as_ref().is_some_and(|r| r.is_outdated()) {
-            self.collect_again(&mut report.work);
+            // Of the present pose, within the distance of the last collection.
+            self.with_reduction(|this, reduction, at| {
+                this.collect_candidates(reduction, at, this.collected_within, &mut report.work);
+            });
             self.complete_for(&motion, Purpose::Motion, &mut report.work);
         }
-    }
-
-    /// The candidates of the present pose, within the distance of the last collection.
-    fn collect_again(&mut self, work: &mut Work) {
-        let Some(mut reduction) = self.reduction.take() else {
-            return;
-        };
-        if let Some(at) = self.place() {
-            self.collect_candidates(&mut reduction, &at, self.collected_within, work);
-        }
-        self.reduction = Some(reduction);
     }
 
     /// Finds the rows that the force needs: for the device's present pose, and for those that it may take until the next set.
@@ -95,18 +83,14 @@ impl GodObject {
         report: &mut StepReport,
     ) {
         let published = self.published_distance(update);
-        let Some(mut reduction) = self.reduction.take() else {
-            return;
-        };
-        if let Some(at) = self.place() {
-            let moved = reduction.moved(self.radius) > 0.0;
+        self.with_reduction(|this, reduction, at| {
+            let moved = reduction.moved(this.radius) > 0.0;
             // What was given up at this pose would be given up again.
             let complete = !moved && (reduction.was_given_up() || reduction.asked() >= published);
             if !complete {
-                self.collect_candidates(&mut reduction, &at, published, &mut report.work);
+                this.collect_candidates(reduction, at, published, &mut report.work);
             }
-        }
-        self.reduction = Some(reduction);
+        });
         let reach =
             self.settings.activation_distance + update.all_moved.min(self.look_ahead_limit());
         self.wanted =
@@ -116,25 +100,58 @@ impl GodObject {
 
     /// Chooses the rows of a set that is published: for a device that is `difference` away and may go `reach` (m) from there.
     pub(super) fn choose(&mut self, difference: &Vector6, reach: f64, work: &mut Work) {
-        let Some(mut reduction) = self.reduction.take() else {
-            return;
-        };
-        let all = self.place().is_some_and(|at| {
-            let surfaces = self.surfaces(None);
-            reduction.set_surfaces(&at, &surfaces);
-            reduction.take_all((&at, &surfaces)) && !reduction.was_given_up()
+        let all = self.with_reduction(|this, reduction, at| {
+            let surfaces = this.surfaces(None);
+            reduction.set_surfaces(at, &surfaces);
+            reduction.take_all((at, &surfaces)) && !reduction.was_given_up()
         });
-        self.reduction = Some(reduction);
-        if !all {
-            self.complete_for(&self.probes(difference, reach), Purpose::Force, work);
-            if self.surfaces(None).move_on() {
-                self.complete_for(&[*difference], Purpose::ForceThen, work);
+        let probes = self.probes(difference, reach);
+        if all != Some(true) {
+            self.complete_for_force(&probes, work);
+        }
+        let met = self.with_reduction(|this, reduction, at| {
+            let continued = |way: &Vector6| this.continued(way, reach);
+            reduction.meet_corners((at, &this.surfaces(None)), &probes[1], continued, work)
+        });
+        if met == Some(true) {
+            if all != Some(true) {
+                // The rows of the other probes are there, and no corner asks for more of them.
+                self.complete_for_force(&probes[..SEARCHED_MOTIONS], work);
             }
+            self.with_reduction(|this, reduction, at| {
+                reduction.forget_corners((at, &this.surfaces(None)));
+            });
         }
         if let Some(reduction) = &mut self.reduction {
             reduction.retire();
         }
         self.write_set();
+    }
+
+    /// What an act on the rows at the present pose says; `None` where no rows are chosen, or the pose is none.
+    fn with_reduction<T>(
+        &mut self,
+        act: impl FnOnce(&mut Self, &mut RowReduction, &At) -> T,
+    ) -> Option<T> {
+        let mut reduction = self.reduction.take()?;
+        let said = self.place().map(|at| act(self, &mut reduction, &at));
+        self.reduction = Some(reduction);
+        said
+    }
+
+    /// Adds the rows that the force needs for a device that is as far away as each of these say; the first is where it is.
+    fn complete_for_force(&mut self, differences: &[Vector6], work: &mut Work) {
+        self.complete_for(differences, Purpose::Force, work);
+        if self.surfaces(None).move_on() {
+            self.complete_for(&differences[..1], Purpose::ForceThen, work);
+        }
+    }
+
+    /// A way that goes on as it began, by `further`, m.
+    fn continued(&self, way: &Vector6, further: f64) -> Vector6 {
+        let share = further / self.motion_length(way);
+        // No way goes nowhere.
+        way * (1.0 + if share.is_finite() { share } else { 0.0 })
     }
 
     /// Where the device may be next: where it is, and as far as it reaches along and about each axis.
@@ -158,22 +175,18 @@ impl GodObject {
 
     /// Adds rows until the answer of every motion violates no candidate.
     fn complete_for(&mut self, motions: &[Vector6], purpose: Purpose, work: &mut Work) {
-        let Some(mut reduction) = self.reduction.take() else {
-            return;
-        };
-        if let Some(at) = self.place() {
-            let answers = self.answers(&mut reduction, &at, motions, purpose, work);
+        self.with_reduction(|this, reduction, at| {
+            let answers = this.answers(reduction, at, motions, purpose, work);
             let count = answers.len().min(SEARCHED_MOTIONS);
             let searched = (&motions[..count], &answers[..count]);
-            if self.search(&mut reduction, &at, searched, purpose, work) {
-                self.answers(&mut reduction, &at, motions, purpose, work);
+            if this.search(reduction, at, searched, purpose, work) {
+                this.answers(reduction, at, motions, purpose, work);
             }
             if reduction.is_full() {
                 // The first motion is the one that is made, or where the device is: others may have taken the place of its rows.
-                self.answers(&mut reduction, &at, &motions[..1], purpose, work);
+                this.answers(reduction, at, &motions[..1], purpose, work);
             }
-        }
-        self.reduction = Some(reduction);
+        });
         self.write_set();
     }
 
@@ -200,13 +213,10 @@ impl GodObject {
         ahead: Option<&Ahead>,
         report: &mut StepReport,
     ) -> Option<Projected> {
-        if ahead.is_some()
-            && let Some(mut reduction) = self.reduction.take()
-        {
-            if let Some(at) = self.place() {
-                reduction.set_surfaces(&at, &self.surfaces(ahead));
-            }
-            self.reduction = Some(reduction);
+        if ahead.is_some() {
+            self.with_reduction(|this, reduction, at| {
+                reduction.set_surfaces(at, &this.surfaces(ahead));
+            });
         }
         let mut projected = self.project(unconstrained, ahead, report)?;
         let led_elsewhere = ahead.is_some() || self.friction.as_ref().is_some_and(Friction::acts);
@@ -239,19 +249,15 @@ impl GodObject {
     }
 
     fn add_violated(&mut self, answer: &Vector6, ahead: Option<&Ahead>, work: &mut Work) -> bool {
-        let Some(mut reduction) = self.reduction.take() else {
-            return false;
-        };
         let purpose = match ahead {
             Some(ahead) if !ahead.eases => Purpose::Room,
             Some(_) => Purpose::RoomEased,
             None => Purpose::Motion,
         };
-        let added = self.place().is_some_and(|at| {
-            let surfaces = self.surfaces(ahead);
-            reduction.add_violated((&at, &surfaces), answer, purpose, work)
+        let added = self.with_reduction(|this, reduction, at| {
+            reduction.add_violated((at, &this.surfaces(ahead)), answer, purpose, work)
         });
-        self.reduction = Some(reduction);
+        let added = added == Some(true);
         if added {
             self.write_set();
         }

@@ -10,6 +10,8 @@ use nalgebra::{Point3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::super::{Contact, in_world};
+use super::met::are_corners;
+use super::row::Known;
 use super::{Purpose, Surfaces, felt};
 use crate::spatial::{Pose, Vector6, pose_difference};
 
@@ -17,6 +19,8 @@ use crate::spatial::{Pose, Vector6, pose_difference};
 #[derive(Debug)]
 pub(super) struct Candidates {
     pub(super) contacts: Vec<Contact>,
+    /// Places of those that are pairs of corners.
+    pub(super) corners: Vec<u32>,
     jacobian: [Vec<f64>; 6],
     /// The rows that the force has, where some differ: of shaded surfaces. Empty otherwise.
     felt: [Vec<f64>; 6],
@@ -38,6 +42,7 @@ impl Candidates {
     pub(super) fn with_capacity(limit: usize) -> Self {
         Self {
             contacts: Vec::with_capacity(limit),
+            corners: Vec::with_capacity(limit),
             jacobian: std::array::from_fn(|_| Vec::with_capacity(limit)),
             felt: std::array::from_fn(|_| Vec::with_capacity(limit)),
             nearer: Vec::with_capacity(limit),
@@ -56,6 +61,7 @@ impl Candidates {
     /// No candidates; the next are collected at this pose of the reference point.
     pub(super) fn clear(&mut self, reference: &Pose) {
         self.contacts.clear();
+        self.corners.clear();
         self.jacobian.iter_mut().for_each(Vec::clear);
         self.felt.iter_mut().for_each(Vec::clear);
         self.nearer.clear();
@@ -70,6 +76,9 @@ impl Candidates {
     }
 
     pub(super) fn push(&mut self, contact: &Contact, jacobian: &Vector6) {
+        if are_corners(&contact.features) {
+            self.corners.push(self.contacts.len() as u32); // at most a set's capacity and what is searched for
+        }
         self.contacts.push(*contact);
         self.gap.push(contact.gap);
         for (column, x) in self.jacobian.iter_mut().zip(jacobian.iter()) {
@@ -143,6 +152,22 @@ impl Candidates {
         if self.moving {
             let nearer = self.contacts.iter().map(|c| surfaces.nearer(c));
             self.nearer.extend(nearer);
+        }
+    }
+
+    /// Another row of the same features takes the place of a candidate, at the pose where they were collected.
+    pub(super) fn replace(&mut self, k: usize, row: &Known) {
+        self.contacts[k] = row.contact;
+        self.gap[k] = row.contact.gap;
+        for (column, x) in self.jacobian.iter_mut().zip(row.jacobian.iter()) {
+            column[k] = *x;
+        }
+        // Of shaded surfaces and of those that move.
+        for (column, x) in self.felt.iter_mut().zip(row.felt.iter()) {
+            column.get_mut(k).into_iter().for_each(|felt| *felt = *x);
+        }
+        if let Some(nearer) = self.nearer.get_mut(k) {
+            *nearer = row.nearer;
         }
     }
 

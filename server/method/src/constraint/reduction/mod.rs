@@ -21,16 +21,18 @@
 //! off its features, those of what it became.
 //!
 //! A row is what its [`Purpose`] makes of a pair: the force has shading normals, and what moves is nearer by the time of the next set. So friction,
-//! shading and motion choose from the same pairs.
+//! shading and motion choose from the same pairs. Corners in the way of the device count by the face that it would meet ([`met`]).
 //!
 //! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
 
 mod at;
 mod candidates;
 mod collected;
+mod corners;
 mod grow;
 #[cfg(test)]
 mod grow_tests;
+mod met;
 mod neighbours;
 mod row;
 
@@ -44,6 +46,7 @@ use crate::quasi_statics::{HalfSpace, Projector, SolverKind};
 use crate::spatial::{Pose, Vector6};
 use crate::world::World;
 use candidates::Candidates;
+use corners::Corners;
 use row::{Known, face, felt, jacobian};
 
 /// Candidates that searches may add to those that were collected.
@@ -75,6 +78,7 @@ const NEAR_REST_DISTANCES: f64 = 4.0;
 pub(crate) struct RowReduction {
     projector: Projector,
     candidates: Candidates,
+    corners: Corners,
     known: Vec<Known>,
     /// Most rows known at a time: as many as the set has room for.
     room: usize,
@@ -106,6 +110,7 @@ impl RowReduction {
         Self {
             projector: Projector::new(SolverKind::ActiveSet, most),
             candidates: Candidates::with_capacity(candidates + SEARCHED),
+            corners: Corners::with_capacity(MAX_ROWS, candidates + SEARCHED),
             known: Vec::with_capacity(MAX_ROWS),
             room: MAX_ROWS.min(candidates),
             now: 0,

@@ -1,0 +1,124 @@
+//! Pairs of corners in the way of the device: each counts by the face that the body would meet.
+
+use super::RowReduction;
+use super::at::{At, Purpose, Surfaces};
+use super::met::{are_corners, clearance, met};
+use super::row::Known;
+use crate::collision::Work;
+use crate::constraint::Contact;
+use crate::spatial::Vector6;
+
+/// Pairs of corners that are set aside, and candidates that stand for another plane than their own.
+#[derive(Debug)]
+pub(super) struct Corners {
+    known: Vec<Known>,
+    /// Gaps of the candidates among them, m.
+    gaps: Vec<f64>,
+    /// Place and contact as it was collected.
+    replaced: Vec<(u32, Contact)>,
+}
+
+impl Corners {
+    pub(super) fn with_capacity(known: usize, candidates: usize) -> Self {
+        Self {
+            known: Vec::with_capacity(known),
+            gaps: Vec::with_capacity(candidates),
+            replaced: Vec::with_capacity(candidates),
+        }
+    }
+}
+
+impl RowReduction {
+    /// Where a pair of corners holds back a device that goes by `motion`, lets each in its way count by the face that the body would meet, for the force;
+    /// whether that changed a row. `continued` is a way as far as the device may have gone by the next set. At the pose where the candidates were
+    /// collected.
+    pub(crate) fn meet_corners(
+        &mut self,
+        of: (&At, &dyn Surfaces),
+        motion: &Vector6,
+        continued: impl Fn(&Vector6) -> Vector6,
+        work: &mut Work,
+    ) -> bool {
+        if !self
+            .known
+            .iter()
+            .any(|row| are_corners(&row.contact.features))
+        {
+            return false;
+        }
+        let held = self.complete(of, &continued(motion), Purpose::Force, work);
+        let mut holding = held
+            .active
+            .iter()
+            .filter_map(|row| self.known.get(row.row as usize));
+        if !holding.any(|row| are_corners(&row.contact.features)) {
+            return false;
+        }
+        self.set_corners_aside();
+        // What holds the body elsewhere leads it past some of them.
+        let answer = self.complete(of, motion, Purpose::Force, work).acceleration;
+        self.bring_corners_back(of, &continued(&answer))
+    }
+
+    fn set_corners_aside(&mut self) {
+        let aside = &mut self.corners;
+        self.known.retain(|row| {
+            let corners = are_corners(&row.contact.features);
+            if corners {
+                aside.known.push(*row);
+            }
+            !corners
+        });
+        for k in &self.candidates.corners {
+            let gap = &mut self.candidates.gap[*k as usize];
+            aside.gaps.push(*gap);
+            *gap = f64::INFINITY;
+        }
+    }
+
+    /// Whether some now count by another plane.
+    fn bring_corners_back(&mut self, of: (&At, &dyn Surfaces), way: &Vector6) -> bool {
+        let (at, surfaces) = of;
+        let mut changed = false;
+        let instead = |contact: &Contact| {
+            // A shaded surface has its own normals.
+            let counts = clearance(of, contact, way) < at.rest_distance
+                && surfaces.shading_normal(contact).is_none();
+            counts.then(|| met(of, contact, way)).flatten()
+        };
+        for (place, gap) in self.corners.gaps.drain(..).enumerate() {
+            let k = self.candidates.corners[place];
+            self.candidates.gap[k as usize] = gap;
+            let contact = self.candidates.contacts[k as usize];
+            if let Some(met) = instead(&contact) {
+                self.corners.replaced.push((k, contact));
+                let row = Known::of(&met, surfaces, &at.center());
+                self.candidates.replace(k as usize, &row);
+            }
+        }
+        while let Some(row) = self.corners.known.pop() {
+            let met = instead(&row.contact);
+            changed |= met.is_some();
+            let row = met.map_or(row, |contact| Known {
+                idle: row.idle,
+                used: row.used,
+                implied: row.implied,
+                ..Known::of(&contact, surfaces, &at.center())
+            });
+            if self.is_full() {
+                self.note_dropped(&row);
+            } else {
+                self.known.push(row);
+            }
+        }
+        changed || !self.corners.replaced.is_empty()
+    }
+
+    /// The candidates are again what was collected.
+    pub(crate) fn forget_corners(&mut self, (at, surfaces): (&At, &dyn Surfaces)) {
+        for (k, contact) in self.corners.replaced.drain(..) {
+            let row = Known::of(&contact, surfaces, &at.center());
+            self.candidates.replace(k as usize, &row);
+        }
+    }
+}
