@@ -376,9 +376,9 @@ fn maps_section(page: &mut String, results: &Results) -> Result<(), Box<dyn Erro
         return Ok(());
     }
     page.push_str(
-        "<h2 id=maps>Stiffest wall that is stable, method by method</h2>\n<p>A device of 0.2 kg and 1 N s/m that nobody holds, 1 kHz, a tick of delay, where \
+        "<h2 id=maps>Stiffest contact that is stable, method by method</h2>\n<p>A device of 0.2 kg and 1 N s/m that nobody holds, 1 kHz, a tick of delay, where \
          the axis does not say otherwise. Points are lines of <a href=\"stability-methods.csv\">stability-methods.csv</a>; those of one place are \
-         drawn side by side. The search ends at 20 and at 100,000 N/m: a point there says no more than that.",
+         drawn side by side. In a hollow the stiffness is that along the surface, the force over the distance from the axis. The search ends at 20 and at 100,000 N/m: a point there says no more than that.",
     );
     for method in maps::METHODS {
         page.push_str(&key(chart::colour(method), 10, method.name()));

@@ -71,7 +71,7 @@ pub fn write(points: &[Point], directory: &Path) -> Result<(), Box<dyn Error>> {
     let root = SVGBackend::new(&file, size).into_drawing_area();
     root.fill(&WHITE)?;
     let (head, grid) = root.split_vertically(HEAD);
-    let title = "Stiffest wall that is stable: each method (points) beside theory (lines)";
+    let title = "Stiffest contact that is stable: each method (points) beside theory (lines)";
     head.draw(&Text::new(title, (20, 8), ("sans-serif", 17)))?;
     let mut x = 24;
     for method in METHODS {

@@ -1,7 +1,7 @@
-//! Stability maps: the stiffest wall that each method renders to a simulated device, against delay, rate, damping and quantisation.
+//! Stability maps: the stiffest contact that each method renders to a simulated device, against delay, rate, damping and quantisation.
 //!
-//! A ball of 1 kg in the hand is pressed on a wall through a device that nobody holds; 0.1 mm more is a disturbance. Above the critical stiffness
-//! it grows, below it dies away. What a map does not sweep is a device of 0.2 kg and 1 N s/m, forces and updates at 1 kHz, a tick of delay, no
+//! A ball of 1 kg in the hand is pressed on a wall, into a corner or a hollow through a device that nobody holds, and disturbed. Above the critical
+//! stiffness that grows, below it dies away. What a map does not sweep is a device of 0.2 kg and 1 N s/m, forces and updates at 1 kHz, a tick of delay, no
 //! quantisation.
 //!
 //! | symbol | name in code | unit  | meaning                                    |
@@ -15,22 +15,26 @@
 //! `b / (T/2 + t_d)`, and for quantisation the bound of passivity `min(2 b / T, 2 f_c / Delta)`
 //! (Abbott and Okamura 2005).
 
+mod contact;
 mod files;
 
 use std::time::Duration;
 
-use god_object::{Pose, Settings, Vector6, World};
-use nalgebra::Vector3;
+use god_object::spatial::{linear, six};
+use god_object::{Pose, Vector6};
+use nalgebra::{UnitQuaternion, Vector3};
 use taut_control_tests::closed_loop::{PERIOD, grip};
 use taut_plant::stability::{SampledLoop, linear_limit, passive_limit_quantised};
 use taut_plant::{Encoder, Grip, Hand, MinJerkPath, Motors, Plant};
 
+pub use contact::Contact;
 pub use files::write;
 pub(crate) use files::{COLOURS, panels};
 
 use crate::crew;
-use crate::method::{Method, Scene};
-use crate::recipes::{Extent, ball, ground};
+use crate::method::Method;
+use crate::recipes::Extent;
+use contact::Pressed;
 
 /// Who is mapped: what differs from them by adaptation or look-ahead differs before a contact, not in it.
 pub const METHODS: [Method; 6] = [
@@ -41,12 +45,6 @@ pub const METHODS: [Method; 6] = [
     Method::Penalty,
     Method::Point,
 ];
-/// Of the ball, m.
-const RADIUS: f64 = 0.01;
-/// What presses the device on the wall, N.
-const PUSH: f64 = 5.0;
-/// m.
-const DISTURBANCE: f64 = 1e-4;
 /// Updates before the device is let go: the method has settled.
 const SETTLING: u32 = 100;
 /// Ticks of a run, s / ms, and which of them are early and late.
@@ -58,14 +56,14 @@ const GROWN: f64 = 100.0;
 /// Softest and stiffest wall of the search, N/m, and the relative width at which it ends.
 const SEARCH: [f64; 2] = [20.0, 100_000.0];
 const SEARCH_WIDTH: f64 = 0.02;
-/// Of force and torque, N and N m: none is in the way.
-const LIMIT: f64 = 1e9;
 /// Coulomb friction where a count is swept, N: without it no count is passive.
 const COULOMB: f64 = 0.02;
 
 /// What is set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
+    /// What holds the ball.
+    pub contact: Contact,
     /// t_d, s.
     pub delay: f64,
     /// f, Hz.
@@ -79,6 +77,7 @@ pub struct Conditions {
 }
 
 const STANDARD: Conditions = Conditions {
+    contact: Contact::Wall,
     delay: 1e-3,
     updates: 1000,
     damping: 1.0,
@@ -98,8 +97,11 @@ pub struct Map {
     at: fn(f64) -> Conditions,
 }
 
+/// Updates, Hz.
+const RATES: [f64; 5] = [70.0, 140.0, 300.0, 500.0, 1000.0];
+
 /// All.
-pub const MAPS: [Map; 4] = [
+pub const MAPS: [Map; 6] = [
     Map {
         name: "delay",
         axis: "delay of the force, ms",
@@ -112,8 +114,28 @@ pub const MAPS: [Map; 4] = [
     Map {
         name: "rate",
         axis: "updates of the method, Hz (forces 1 kHz)",
-        values: &[70.0, 140.0, 300.0, 500.0, 1000.0],
+        values: &RATES,
         at: |hz| Conditions {
+            updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "corner",
+        axis: "updates of the method in a corner of two walls, Hz",
+        values: &RATES,
+        at: |hz| Conditions {
+            contact: Contact::Corner,
+            updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "turning",
+        axis: "updates of the method in a hollow, where the contact turns, Hz",
+        values: &RATES,
+        at: |hz| Conditions {
+            contact: Contact::Hollow,
             updates: hz as u32,
             ..STANDARD
         },
@@ -205,32 +227,25 @@ impl Conditions {
         (calm * wild).sqrt()
     }
 
-    /// Whether the disturbance of a wall of this stiffness, N/m, grows.
+    /// Whether the disturbance of a contact of this stiffness, N/m, grows.
     fn grows(&self, method: Method, stiffness: f64) -> bool {
-        let scene = scene(stiffness);
+        let pressed = self.contact.pressed(stiffness);
         let period = 1.0 / f64::from(self.updates);
-        let tuning = method.tunings()[0];
-        let mut method = method.start(&scene, period, tuning);
-        let pressed = RADIUS - PUSH / stiffness;
-        let at_rest = Pose::translation(0.0, 0.0, pressed);
+        let mut method = method.start(&pressed.scene, period, method.tunings()[0]);
+        let start = pressed.scene.start.translation.vector;
+        let at = |place: Vector3<f64>| Pose::from_parts(place.into(), UnitQuaternion::identity());
+        let at_rest = at(pressed.at_rest);
         let mut updates = f64::from(SETTLING);
         for update in 0..SETTLING {
-            // Down in steps, so that every method has the contact before the device is past it.
+            // There in steps, so that every method has the contact before the device is past it.
             let share = f64::from(update + 1) / f64::from(SETTLING / 2);
-            let place = scene
-                .start
-                .translation
-                .vector
-                .lerp(&at_rest.translation.vector, share.min(1.0));
-            method.update(
-                f64::from(update) * period,
-                &Pose::from_parts(place.into(), at_rest.rotation),
-            );
-            method.publish(f64::from(update) * period);
-            let _ = method.force(f64::from(update) * period, &at_rest);
+            let time = f64::from(update) * period;
+            method.update(time, &at(start.lerp(&pressed.at_rest, share.min(1.0))));
+            method.publish(time);
+            let _ = method.force(time, &at_rest);
         }
         let before = updates * period;
-        let mut plant = self.plant(&at_rest);
+        let mut plant = self.plant(&pressed);
         let frequency = (stiffness / self.device().mass).sqrt();
         let (mut early, mut late) = (0.0_f64, 0.0_f64);
         for tick in 0..TICKS {
@@ -244,12 +259,12 @@ impl Conditions {
                 method.update(time, &measured);
                 updates += 1.0;
             }
-            let mut wrench = method.force(time, &measured);
-            wrench[2] -= PUSH;
-            plant.command(&(wrench.component_mul(&ALONG_Z)));
-            let place = plant.pose().translation.z - pressed;
-            let size = place.hypot(plant.velocity()[2] / frequency);
-            if size.is_nan() || size > GROWN * DISTURBANCE {
+            let force = linear(&method.force(time, &measured)) + pressed.push;
+            plant.command(&six(&force.component_mul(&pressed.free), &Vector3::zeros()));
+            let place = plant.pose().translation.vector - pressed.at_rest;
+            let velocity = linear(&plant.velocity()).component_mul(&pressed.free);
+            let size = place.norm().hypot(velocity.norm() / frequency);
+            if size.is_nan() || size > GROWN * pressed.disturbance.norm() {
                 return true;
             }
             if EARLY.contains(&tick) {
@@ -258,12 +273,14 @@ impl Conditions {
                 late = late.max(size);
             }
         }
-        // A count of the encoder is never at rest: what stays as large as a count has not grown.
-        late > early.max(2.0 * self.resolution)
+        // A hollow bounds what grows. A count of the encoder is never at rest: what stays as large as a count has not grown.
+        let before = early.min(pressed.disturbance.norm());
+        late > before.max(2.0 * self.resolution)
     }
 
-    fn plant(&self, at_rest: &Pose) -> Plant {
-        let mut plant = Plant::new(self.device(), Hand::RELEASED, MinJerkPath::hold(*at_rest))
+    fn plant(&self, pressed: &Pressed) -> Plant {
+        let at_rest = Pose::from(pressed.at_rest);
+        let mut plant = Plant::new(self.device(), Hand::RELEASED, MinJerkPath::hold(at_rest))
             .with_motors(Motors {
                 delay: Duration::from_secs_f64(self.delay),
                 lag: Duration::ZERO,
@@ -275,32 +292,10 @@ impl Conditions {
                 angle: 0.0,
             });
         }
-        let disturbed = Pose::translation(0.0, 0.0, at_rest.translation.z - DISTURBANCE);
+        let disturbed = Pose::from(pressed.at_rest + pressed.disturbance);
         plant.place(disturbed, Vector6::zeros());
         plant
     }
-}
-
-/// The wall is one axis: what a method does beside it is another map.
-const ALONG_Z: Vector6 = Vector6::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
-
-/// A ball just above a wall.
-fn scene(stiffness: f64) -> Scene {
-    let world = World {
-        body: ball(RADIUS),
-        obstacles: vec![ground()],
-    };
-    let start = Pose::translation(0.0, 0.0, RADIUS + 1e-4);
-    let mut scene = Scene::new(world, 2.0 * RADIUS, 0.1, start);
-    let mass = scene.world.body.mass;
-    scene.settings = Settings {
-        k_h: stiffness / (scene.settings.k_s * mass),
-        force_limit: LIMIT,
-        torque_limit: LIMIT,
-        adaptation: None,
-        ..scene.settings
-    };
-    scene
 }
 
 /// All points of all maps, on so many threads; the quick extent has the ends of each axis alone. Calls `done` after each.
