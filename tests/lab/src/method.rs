@@ -82,6 +82,15 @@ impl Scene {
     }
 }
 
+/// The same where an update covers another share of the way to the device, k_s: the stiffness, `k_h k_s m`, is kept.
+pub(crate) fn with_share(given: Settings, share: f64) -> Settings {
+    Settings {
+        k_s: share,
+        k_h: given.k_h * given.k_s / share,
+        ..given
+    }
+}
+
 /// The methods that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
@@ -153,7 +162,13 @@ impl Method {
 
     /// The method at the start of a scene, updated every `period` seconds.
     pub fn start(self, scene: &Scene, period: f64, tuning: Tuning) -> Box<dyn HapticMethod> {
-        let mut by_default = scene.settings;
+        let way = match tuning {
+            Tuning::Way(way) => Some(way),
+            Tuning::Ahead { way, .. } => way,
+            _ => None,
+        };
+        let on_its_way = |given| way.map_or(given, |way| with_share(given, way));
+        let mut by_default = on_its_way(scene.settings);
         if let Tuning::Touching(share) | Tuning::Ahead { share, .. } = tuning {
             by_default.rest_distance *= share;
             let least = 2.0 * by_default.rest_distance;
@@ -166,7 +181,10 @@ impl Method {
             ..by_default
         };
         match self {
-            Self::Ours => Box::new(GodObjectMethod::new(scene, &scene.fitted(period))),
+            Self::Ours => {
+                let fitted = on_its_way(scene.fitted(period));
+                Box::new(GodObjectMethod::new(scene, &fitted))
+            }
             Self::OursByDefault => Box::new(GodObjectMethod::new(scene, &by_default)),
             Self::PaperAdapted => Box::new(GodObjectMethod::new(scene, &paper)),
             Self::Paper => {

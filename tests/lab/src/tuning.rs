@@ -12,6 +12,8 @@ const TOUCHING_FARTHEST: f64 = 1600.0;
 /// Rest distances over the default that discrete detection is tried with while it looks ahead, and steps within an update.
 const TOUCHING_AHEAD: [f64; 3] = [1.0, 25.0, 400.0];
 const STEPS_AHEAD: [u32; 2] = [1, 10];
+/// Share of the way to the device that a body which looks ahead is tried with beside the default, k_s: all of it.
+const WHOLE_WAY: f64 = 1.0;
 /// Inertias and damping ratios that are tried for virtual coupling. Less inertia than none there is not: the proxy is where the spring is at rest.
 pub(crate) const PROXIES: [(f64, f64); 6] = [
     (0.02, 1.0),
@@ -33,20 +35,20 @@ impl Method {
     /// The settings among which the best is searched for each recipe and rate; the first is the default.
     pub fn tunings(self) -> Vec<Tuning> {
         match self {
-            Self::Ours | Self::OursByDefault | Self::DoesNothing | Self::RandomForce => {
-                vec![Tuning::Default]
-            }
+            Self::OursByDefault | Self::DoesNothing | Self::RandomForce => vec![Tuning::Default],
+            Self::Ours => vec![Tuning::Default, Tuning::Way(WHOLE_WAY)],
             Self::Paper | Self::PaperAdapted => {
                 let farthest = Tuning::Touching(TOUCHING_FARTHEST);
                 touching().chain([farthest]).collect()
             }
             Self::Discrete => {
-                let ahead = TOUCHING_AHEAD.iter().flat_map(|share| {
-                    STEPS_AHEAD.map(|steps| Tuning::Ahead {
-                        share: *share,
-                        steps,
+                let each = |share: &f64| {
+                    let share = *share;
+                    STEPS_AHEAD.map(|steps| {
+                        [None, Some(WHOLE_WAY)].map(|way| Tuning::Ahead { share, steps, way })
                     })
-                });
+                };
+                let ahead = TOUCHING_AHEAD.iter().flat_map(each).flatten();
                 touching().chain(ahead).collect()
             }
             Self::Penalty => [ShellForce::Deepest, ShellForce::Mean]
@@ -85,6 +87,8 @@ fn touching() -> impl Iterator<Item = Tuning> {
 pub enum Tuning {
     /// Nothing.
     Default,
+    /// Share of the way to the device that the body covers in an update, k_s, at the same stiffness.
+    Way(f64),
     /// Rest distance of the paper's god-object, over the default; contacts within two of them touch.
     Touching(f64),
     /// Discrete detection that looks as far ahead as this project's method does.
@@ -93,6 +97,8 @@ pub enum Tuning {
         share: f64,
         /// Most projections, motions and collections within an update.
         steps: u32,
+        /// k_s where it is not the default.
+        way: Option<f64>,
     },
     /// The proxy of virtual coupling.
     Proxy {
@@ -151,11 +157,13 @@ impl fmt::Display for Tuning {
             Self::Round(force) => write!(f, "{force} of a ball; else of vertices"),
             Self::Touch(share) => write!(f, "touching within {share} rest distances"),
             Self::Touching(share) => write!(f, "{share} rest distances"),
-            Self::Ahead { share, steps } => {
+            Self::Way(way) => write!(f, "k_s {way}"),
+            Self::Ahead { share, steps, way } => {
                 write!(
                     f,
                     "looks ahead; {share} rest distances; at most {steps} steps"
-                )
+                )?;
+                way.map_or(Ok(()), |way| write!(f, "; k_s {way}"))
             }
             Self::Proxy {
                 share,

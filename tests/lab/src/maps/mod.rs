@@ -8,6 +8,7 @@
 //! |--------|--------------|-------|--------------------------------------------|
 //! | t_d    | `delay`      | s     | of the force                               |
 //! | f      | `updates`    | Hz    | updates of the method; forces stay at 1 kHz |
+//! | k_s    | `k_s`        | –     | share of the way to the device that an update covers |
 //! | b      | `damping`    | N s/m | of the device                              |
 //! | Delta  | `resolution` | m     | one count of its encoder                   |
 //!
@@ -32,7 +33,7 @@ pub use files::write;
 pub(crate) use files::{COLOURS, panels};
 
 use crate::crew;
-use crate::method::Method;
+use crate::method::{Method, with_share};
 use crate::recipes::Extent;
 use contact::Pressed;
 
@@ -68,6 +69,8 @@ pub struct Conditions {
     pub delay: f64,
     /// f, Hz.
     pub updates: u32,
+    /// Share of the way to the device that a god-object covers in an update.
+    pub k_s: f64,
     /// b, N s/m.
     pub damping: f64,
     /// f_c, N.
@@ -80,6 +83,7 @@ const STANDARD: Conditions = Conditions {
     contact: Contact::Wall,
     delay: 1e-3,
     updates: 1000,
+    k_s: 0.5,
     damping: 1.0,
     coulomb: 0.0,
     resolution: 0.0,
@@ -101,7 +105,7 @@ pub struct Map {
 const RATES: [f64; 5] = [70.0, 140.0, 300.0, 500.0, 1000.0];
 
 /// All.
-pub const MAPS: [Map; 6] = [
+pub const MAPS: [Map; 7] = [
     Map {
         name: "delay",
         axis: "delay of the force, ms",
@@ -137,6 +141,17 @@ pub const MAPS: [Map; 6] = [
         at: |hz| Conditions {
             contact: Contact::Hollow,
             updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "way",
+        axis: "k_s of god-objects, in a hollow at 300 Hz",
+        values: &[0.25, 0.5, 0.75, 1.0],
+        at: |k_s| Conditions {
+            contact: Contact::Hollow,
+            updates: 300,
+            k_s,
             ..STANDARD
         },
     },
@@ -229,7 +244,8 @@ impl Conditions {
 
     /// Whether the disturbance of a contact of this stiffness, N/m, grows.
     fn grows(&self, method: Method, stiffness: f64) -> bool {
-        let pressed = self.contact.pressed(stiffness);
+        let mut pressed = self.contact.pressed(stiffness);
+        pressed.scene.settings = with_share(pressed.scene.settings, self.k_s);
         let period = 1.0 / f64::from(self.updates);
         let mut method = method.start(&pressed.scene, period, method.tunings()[0]);
         let start = pressed.scene.start.translation.vector;

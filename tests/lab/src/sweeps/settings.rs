@@ -4,6 +4,7 @@ use god_object::{Adaptation, Settings};
 
 use super::{Cost, Runs, Sweep, Variant};
 use crate::clock::RATES;
+use crate::method::with_share;
 
 const fn sweep(
     name: &'static str,
@@ -49,14 +50,6 @@ pub(super) const SHARE: Sweep = sweep(
         [0.1, 0.25, 0.5, 0.75, 1.0].map(of).into()
     },
 );
-
-fn with_share(given: Settings, share: f64) -> Settings {
-    Settings {
-        k_s: share,
-        k_h: given.k_h * given.k_s / share,
-        ..given
-    }
-}
 
 /// How far above the minimum gap continuous collision detection may stop: of that gap, and with it less than the rest distance, which is ten of them.
 pub(super) const CCD_TOLERANCE: Sweep = sweep(
