@@ -372,6 +372,34 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_corner_is_as_stable_as_a_wall() {
+        let at = |contact| {
+            Conditions {
+                contact,
+                updates: 70,
+                ..STANDARD
+            }
+            .critical(Method::Ours)
+        };
+        let ratio = at(Contact::Corner) / at(Contact::Wall);
+        assert!((0.95..1.05).contains(&ratio), "{ratio}");
+    }
+
+    /// Normals of a hollow are as old as the body is behind: what goes all the way to the device bears more, and none what a wall does.
+    #[test]
+    fn a_contact_that_turns_bears_more_the_farther_an_update_goes() {
+        let at = |k_s| Conditions {
+            contact: Contact::Hollow,
+            updates: 300,
+            k_s,
+            ..STANDARD
+        };
+        let [half, whole] = [0.5, 1.0].map(|k_s| at(k_s).critical(Method::Ours));
+        let spring = at(1.0).by_eigenvalues();
+        assert!(1.4 * half < whole && whole < 0.7 * spring, "{half} {whole}");
+    }
+
     /// A mass and a damper between hand and wall take stiffness: the device's limit is not reached at slow updates.
     #[test]
     fn slow_updates_cost_virtual_coupling_its_stability() {
