@@ -278,7 +278,7 @@ impl Conditions {
             let force = linear(&method.force(time, &measured)) + pressed.push;
             plant.command(&six(&force.component_mul(&pressed.free), &Vector3::zeros()));
             let place = plant.pose().translation.vector - pressed.at_rest;
-            let velocity = linear(&plant.velocity()).component_mul(&pressed.free);
+            let velocity = linear(plant.velocity()).component_mul(&pressed.free);
             let size = place.norm().hypot(velocity.norm() / frequency);
             if size.is_nan() || size > GROWN * pressed.disturbance.norm() {
                 return true;
@@ -355,7 +355,9 @@ mod tests {
     /// The method of this project is a spring to the wall: its limit is that of the eigenvalues.
     #[test]
     fn a_wall_of_ours_is_as_stable_as_its_spring() {
-        for map in MAPS.iter().filter(|map| map.name != "quantisation") {
+        let of_a_wall = |map: &&Map| (map.at)(map.values[0]).contact == Contact::Wall;
+        let maps = MAPS.iter().filter(of_a_wall);
+        for map in maps.filter(|map| map.name != "quantisation") {
             for at in [map.values[0], map.values[map.values.len() - 1]] {
                 let conditions = (map.at)(at);
                 let (found, exact) = (
@@ -400,11 +402,12 @@ mod tests {
         assert!(1.4 * half < whole && whole < 0.7 * spring, "{half} {whole}");
     }
 
-    /// A mass and a damper between hand and wall take stiffness: the device's limit is not reached at slow updates.
+    /// A mass and a damper between hand and wall bear more than the device does, but not what turns at slow updates.
     #[test]
     fn slow_updates_cost_virtual_coupling_its_stability() {
         let at = |updates| {
             Conditions {
+                contact: Contact::Hollow,
                 updates,
                 ..STANDARD
             }
