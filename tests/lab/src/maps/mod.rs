@@ -54,6 +54,8 @@ const EARLY: std::ops::Range<u32> = 100..500;
 const LATE: std::ops::Range<u32> = 1100..1500;
 /// A disturbance that has grown this much need not be followed further.
 const GROWN: f64 = 100.0;
+/// One that stays larger by this has grown, too: bounces and cycles have a largest size.
+const GROWN_AND_BOUNDED: f64 = 2.0;
 /// Softest and stiffest wall of the search, N/m, and the relative width at which it ends.
 const SEARCH: [f64; 2] = [20.0, 100_000.0];
 const SEARCH_WIDTH: f64 = 0.02;
@@ -290,7 +292,7 @@ impl Conditions {
             }
         }
         // A hollow bounds what grows. A count of the encoder is never at rest: what stays as large as a count has not grown.
-        let before = early.min(pressed.disturbance.norm());
+        let before = early.min(GROWN_AND_BOUNDED * pressed.disturbance.norm());
         late > before.max(2.0 * self.resolution)
     }
 
