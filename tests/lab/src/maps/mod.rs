@@ -23,7 +23,7 @@ use std::time::Duration;
 
 use god_object::spatial::{linear, six};
 use god_object::{Pose, Vector6};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use taut_control_tests::closed_loop::{PERIOD, grip};
 use taut_plant::stability::{SampledLoop, linear_limit, passive_limit_quantised};
 use taut_plant::{Encoder, Grip, Hand, MinJerkPath, Motors, Plant};
@@ -251,14 +251,16 @@ impl Conditions {
         let period = 1.0 / f64::from(self.updates);
         let mut method = method.start(&pressed.scene, period, method.tunings()[0]);
         let start = pressed.scene.start.translation.vector;
-        let at = |place: Vector3<f64>| Pose::from_parts(place.into(), UnitQuaternion::identity());
-        let at_rest = at(pressed.at_rest);
+        let at_rest = Pose::from(pressed.at_rest);
         let mut updates = f64::from(SETTLING);
         for update in 0..SETTLING {
             // There in steps, so that every method has the contact before the device is past it.
             let share = f64::from(update + 1) / f64::from(SETTLING / 2);
             let time = f64::from(update) * period;
-            method.update(time, &at(start.lerp(&pressed.at_rest, share.min(1.0))));
+            method.update(
+                time,
+                &Pose::from(start.lerp(&pressed.at_rest, share.min(1.0))),
+            );
             method.publish(time);
             let _ = method.force(time, &at_rest);
         }
