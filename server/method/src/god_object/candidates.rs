@@ -6,7 +6,8 @@ use crate::constraint::{At, Collected, Contact, RowReduction, collect_bounded};
 
 impl GodObject {
     /// The facing pairs within `distance`, m; every obstacle has its share of the work. Where some need more than last time, those that come after
-    /// have what these leave, and at least what each would have if all that are near had the same.
+    /// have what these leave, and at least what each would have if all that are near had the same. First come those that needed the least, and of
+    /// these the nearest, so that the order of the scene says nothing.
     pub(super) fn collect_candidates(
         &mut self,
         reduction: &mut RowReduction,
@@ -18,7 +19,12 @@ impl GodObject {
         self.set.gap_min = f64::INFINITY;
         let share = self.share();
         let (mut looked_at, mut left, mut even) = (0, self.settings.look_ahead_pairs, None);
-        for index in (0..at.places.len()).filter(|index| at.places[*index].chosen) {
+        self.note_turns(at);
+        for turn in 0..self.turns.len() {
+            let index = self.turns[turn];
+            if !at.places[index].chosen {
+                continue;
+            }
             let pairs = if left < share {
                 let even = even.get_or_insert_with(|| self.even_share(at, distance));
                 share.min(left.max(*even))
@@ -37,6 +43,17 @@ impl GodObject {
         // Known rows may be nearer than what a collection that was given up has found.
         let gap_min = reduction.gap_min(at, work).min(self.given.gap_min);
         self.set.gap_min = self.set.gap_min.min(gap_min);
+    }
+
+    /// In which order the obstacles have their turn.
+    fn note_turns(&mut self, at: &At) {
+        let body = &at.reference.translation.vector;
+        let off = |index: usize| (at.places[index].pose.translation.vector - body).norm();
+        let looked_at = &self.looked_at;
+        self.turns.sort_unstable_by(|a, b| {
+            let needed = looked_at[*a].cmp(&looked_at[*b]);
+            needed.then_with(|| off(*a).total_cmp(&off(*b)))
+        });
     }
 
     /// Most pairs to look at for one obstacle, whichever comes first: what those do not need that needed less last time is the others'.

@@ -16,8 +16,9 @@ impl GodObject {
     ) -> (f64, Option<usize>) {
         let settings = Self::advancement(&self.settings);
         let (mut free, mut stopped) = (1.0, None);
-        let obstacles = self.world.obstacles.iter().zip(&self.obstacles);
-        for (index, (obstacle, placed)) in obstacles.enumerate() {
+        // What is near comes first: the others need to be searched only up to where it stops the body.
+        for index in self.turns.iter().rev().copied() {
+            let (obstacle, placed) = (&self.world.obstacles[index], &self.obstacles[index]);
             if goes_along(placed) {
                 continue;
             }
@@ -35,7 +36,6 @@ impl GodObject {
                 TimeOfImpact::Impact { time } | TimeOfImpact::IterationLimit { time } => time,
                 TimeOfImpact::Overlapping => 0.0,
             };
-            // The next obstacle needs to be searched only up to here.
             let shortened = time.clamp(0.0, 1.0);
             free *= shortened;
             motion.displacement *= shortened;

@@ -65,6 +65,8 @@ pub struct GodObject {
     pub(super) places: Arc<[Place]>,
     /// Pairs that the last collection of each obstacle looked at.
     pub(super) looked_at: Vec<u64>,
+    /// The obstacles, those first whose last collection looked at the fewest pairs.
+    pub(super) turns: Vec<usize>,
     /// Rows of those obstacles that are not chosen from.
     pub(super) given: GivenRows,
 }
@@ -96,6 +98,7 @@ impl GodObject {
                 })
                 .collect(),
             looked_at: vec![0; obstacles],
+            turns: (0..obstacles).collect(),
             given: GivenRows::with_capacity(capacity),
             world,
             settings,
