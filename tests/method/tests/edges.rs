@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use god_object::collision::{CollisionWorkspace, Work};
 use god_object::constraint::collect_contacts;
-use god_object::{Coupling, GodObject, Mesh, Pose, Settings, World};
+use god_object::{Body, Coupling, GodObject, Mesh, Pose, Primitive, Settings, World};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use taut_method_tests::solids::{body, cells, mesh, obstacle};
-use taut_scene::shapes::{Axis, cuboid, cylinder, sphere};
+use taut_scene::shapes::{Axis, box_with_hole, cuboid, cylinder, sphere};
 
 /// Updates of the god-object in milliseconds: 1000, 333 and 71 Hz. Forces come at 1 kHz.
 const PERIODS: [u32; 3] = [1, 3, 14];
@@ -270,4 +270,59 @@ fn contacts_within(world: &World, pose: &Pose, distance: f64) -> usize {
         &mut Work::default(),
     );
     contacts.len()
+}
+
+/// Facets past the edges of the one that a ball is on cannot be touched where it is, and can be before the next update.
+#[test]
+fn a_ball_in_a_hollow_feels_the_facets_that_it_comes_to_in_time() {
+    let radius = 9e-3;
+    let ball = Body {
+        primitive: Some(Primitive::Sphere {
+            center: Point3::origin(),
+            radius,
+        }),
+        ..body(mesh(sphere(radius, 2)))
+    };
+    for facets in [24, 72, 360] {
+        let hole = box_with_hole([0.03; 3], 0.01, facets, Axis::Y);
+        let world = Arc::new(World {
+            body: ball.clone(),
+            obstacles: vec![obstacle("hollow", mesh(hole), Pose::identity())],
+        });
+        let settings = Settings::for_size(2.0 * radius);
+        let device = |angle: f64| {
+            let deep = Vector3::new(angle.sin(), 0.0, -angle.cos()) * 2e-3;
+            Pose::from(deep)
+        };
+        let start = || {
+            let god_object = GodObject::new(world.clone(), settings, Pose::identity());
+            (
+                god_object.expect("a free start"),
+                Coupling::new(&world, &settings),
+            )
+        };
+        let ((mut stale, mut felt), (mut fresh, mut right)) = (start(), start());
+        let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+        for update in 0..60 {
+            let angle = 0.11 * f64::from(update);
+            stale.step(&device(angle), None);
+            for part in [0.5, 1.0, 1.5, 2.0] {
+                let device = device(angle + 0.11 * part);
+                for _ in 0..8 {
+                    fresh.step(&device, None);
+                }
+                let [felt, right] =
+                    [(&mut felt, &stale), (&mut right, &fresh)].map(|(coupling, god_object)| {
+                        let output = coupling.step(1.0, &device, god_object.constraint_set());
+                        Vector3::from(output.wrench.fixed_rows::<3>(0))
+                    });
+                if update > 2 {
+                    worst = worst.max((felt - right).norm());
+                    largest = largest.max(right.norm());
+                }
+            }
+        }
+        println!("{facets} facets: off by {worst:e} of {largest} N");
+        assert!(largest > 0.8 && worst < 1e-9, "{facets}: {worst} N");
+    }
 }

@@ -18,6 +18,7 @@ pub(crate) use collect::{Nearest, collect_bounded, in_world};
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
 pub(crate) use reduction::{At, MAX_ROWS, Place, Purpose, RowReduction, Surfaces};
+pub(crate) use reentrant::covers_ball;
 pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};
 pub(crate) use violated::{Violated, for_violated};

@@ -19,6 +19,8 @@ use crate::geometry::Mesh;
 const MAX_FACES: usize = 32;
 /// Most faces between the end of a face and the place under which it goes on.
 const MAX_STEPS: usize = 4;
+/// The same for a ball, which goes over many facets of a fine hollow from one update to the next.
+const MAX_BALL_STEPS: usize = 64;
 /// A face seen at a flatter angle than that of this sine does not lie over anything.
 const GRAZING: f64 = 0.05;
 /// Share of a way by which it may rise out of a surface that it lies in.
@@ -140,8 +142,28 @@ pub(super) fn covers_foot(
     place: impl Fn(u32) -> [Point3<f64>; 3],
     point: &Point3<f64>,
 ) -> bool {
-    let mut face = t;
-    for _ in 0..=MAX_STEPS {
+    way_to_foot(mesh, t, MAX_STEPS, place, point).is_some()
+}
+
+/// The same for a ball about a point, of the faces of one flat region for one alone: that which borders on the next region.
+///
+/// A point that lies past a reentrant side of the angle a, h above the face behind it, is h / cos(a) or more above the plane of the face before: a ball that
+/// is clear of the face that it is over is clear of the plane of `t`, too.
+pub(crate) fn covers_ball(mesh: &Mesh, t: u32, middle: &Point3<f64>) -> bool {
+    let first = way_to_foot(mesh, t, MAX_BALL_STEPS, |t| mesh.corners(t), middle);
+    first.is_some_and(|edge| !mesh.edges()[edge as usize].flat)
+}
+
+/// The side of triangle `t` across which a way of so many steps begins over sides that do not stand out, to the face that the point is over.
+fn way_to_foot(
+    mesh: &Mesh,
+    t: u32,
+    steps: usize,
+    place: impl Fn(u32) -> [Point3<f64>; 3],
+    point: &Point3<f64>,
+) -> Option<u32> {
+    let (mut face, mut first) = (t, None);
+    for _ in 0..=steps {
         let corners = place(face);
         let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
         let beyond = (0..3).find(|k| {
@@ -150,16 +172,18 @@ pub(super) fn covers_foot(
             !inside
         });
         let Some(side) = beyond else {
-            return face != t;
+            return first;
         };
-        let edge = &mesh.edges()[mesh.triangle_edges(face)[side] as usize];
+        let e = mesh.triangle_edges(face)[side];
+        let edge = &mesh.edges()[e as usize];
         if edge.is_convex() {
-            return false;
+            return None;
         }
+        first.get_or_insert(e);
         let [left, right] = edge.faces;
         face = if left == face { right } else { left };
     }
-    false
+    None
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 use super::Primitive;
 use super::bound::{Bound, for_triangles};
 use super::element::{Row, weights};
+use super::implied::ImpliedRows;
 use super::touching::{Touching, primitive_pair, rows_of_triangle};
 use crate::collision::{CollisionWorkspace, MAX_CANDIDATES, Placement, Work};
 use crate::constraint::{Collected, Contact, FeaturePair, Nearest, in_world};
@@ -157,6 +158,15 @@ impl MeshSide<'_> {
         let activation_distance = sink.activation_distance;
         let nodes = self.mesh.tree().nodes();
         let (mut node_pairs, mut triangles) = (0, 0);
+        let mut implied = ImpliedRows::new(activation_distance);
+        // Rows have the primitive first.
+        let mut take = |row: &Row, t: u32| {
+            if self.mesh_moves {
+                sink.take(&row.reversed(), None);
+            } else {
+                sink.take(row, Some((self.mesh, t)));
+            }
+        };
         for_triangles(
             self.mesh,
             stack,
@@ -166,17 +176,20 @@ impl MeshSide<'_> {
             },
             |t| {
                 triangles += 1;
-                // Rows have the primitive first.
-                rows_of_triangle(&touching, self.mesh, t, activation_distance, &mut |row| {
-                    if self.mesh_moves {
-                        sink.take(&row.reversed(), None);
-                    } else {
-                        sink.take(&row, Some((self.mesh, t)));
-                    }
-                });
+                rows_of_triangle(
+                    &touching,
+                    self.mesh,
+                    t,
+                    activation_distance,
+                    &mut implied,
+                    &mut |row| take(&row, t),
+                );
                 true
             },
         );
+        for (row, t) in implied.rows() {
+            take(row, *t);
+        }
         work.node_pairs += node_pairs;
         work.triangle_pairs += triangles;
         work.feature_pairs += triangles;

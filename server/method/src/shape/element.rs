@@ -13,7 +13,8 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::constraint::{
-    Feature, LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_in_edge_cone, is_in_vertex_cone, is_over,
+    Feature, LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, covers_ball, is_in_edge_cone,
+    is_in_vertex_cone, is_over,
 };
 use crate::geometry::Mesh;
 use crate::geometry::distance::barycentric;
@@ -187,6 +188,26 @@ pub(super) fn knob_face(a: &Knob, mesh: &Mesh, t: u32) -> Option<Row> {
         [a.round, 0.0],
         normal,
     ))
+}
+
+/// A ball past the end of a face, over others that are implied to hold it back before it ([`covers_ball`]), and at most `within` from its plane, m.
+pub(super) fn knob_past_face(a: &Knob, mesh: &Mesh, t: u32, within: f64) -> Option<Row> {
+    let (corners, normal) = (mesh.corners(t), *mesh.face_normal(t));
+    let height = normal.dot(&(a.at - corners[0]));
+    let gap = height - a.round;
+    let past = a.round > 0.0
+        && gap >= 0.0
+        && gap <= within // false for NaN
+        && a.cone.holds(&-normal, LOOK_AHEAD_TILT)
+        && covers_ball(mesh, t, &a.at);
+    past.then(|| {
+        Row::between(
+            [a.feature, Feature::Face(t)],
+            [a.at, a.at - normal * height],
+            [a.round, 0.0],
+            normal,
+        )
+    })
 }
 
 /// A point over a half-space.

@@ -11,6 +11,7 @@ mod collect;
 mod cylinder;
 mod cylinder_pair;
 mod element;
+mod implied;
 mod intersection;
 mod piece;
 mod primitive;

@@ -5,7 +5,10 @@ use nalgebra::Vector3;
 use super::Primitive;
 use super::cylinder::Cylinder;
 use super::cylinder_pair::cylinder_cylinder;
-use super::element::{Cone, Knob, Rod, Row, knob_face, knob_knob, knob_plane, knob_rod, rod_rod};
+use super::element::{
+    Cone, Knob, Rod, Row, knob_face, knob_knob, knob_past_face, knob_plane, knob_rod, rod_rod,
+};
+use super::implied::ImpliedRows;
 use super::primitive::unit_axis;
 use crate::collision::Placement;
 use crate::constraint::Feature;
@@ -77,12 +80,13 @@ impl Touching {
     }
 }
 
-/// Rows between a primitive and the features that triangle `t` owns, and its face; the primitive first.
+/// Rows between a primitive and the features that triangle `t` owns, and its face; the primitive first. Those of its face past its end are `implied`.
 pub(super) fn rows_of_triangle(
     touching: &Touching,
     mesh: &Mesh,
     t: u32,
     activation_distance: f64,
+    implied: &mut ImpliedRows,
     found: &mut dyn FnMut(Row),
 ) {
     match touching {
@@ -90,7 +94,11 @@ pub(super) fn rows_of_triangle(
         Touching::Plane(..) => {}
         Touching::Ball(_) | Touching::Capsule(..) => {
             for knob in touching.round().into_iter().flat_map(|(knobs, _)| knobs) {
-                hand_on(knob_face(knob, mesh, t), found);
+                if let Some(row) = knob_face(knob, mesh, t) {
+                    found(row);
+                } else if let Some(row) = knob_past_face(knob, mesh, t, implied.within()) {
+                    implied.offer(row, t);
+                }
             }
         }
     }
