@@ -266,13 +266,15 @@ fn without_rotation_the_rounds_change_no_bit() {
     }
 }
 
-/// The device turns the box about its lower edge: with rounds one update gets much farther before it must look again.
-#[test]
-fn a_body_that_pivots_needs_fewer_sub_steps() {
+/// Sub-steps in which the box follows a device that turns it about its lower edge by 0.9 rad at once, for 0 to 2 rounds.
+fn substeps_of_a_pivot(k_s: f64) -> [u32; 3] {
     let world = box_on_table();
     let turned = |angle: f64, z: f64| Pose::new(Vector3::new(0.0, 0.0, z), Vector3::y() * angle);
-    let substeps = [0, 1, 2].map(|rounds| {
-        let settings = settings(rounds);
+    [0, 1, 2].map(|rounds| {
+        let settings = Settings {
+            k_s,
+            ..settings(rounds)
+        };
         let start = turned(
             0.3,
             height(&Rotation3::from_scaled_axis(Vector3::y() * 0.3)) + 2e-5,
@@ -289,10 +291,25 @@ fn a_body_that_pivots_needs_fewer_sub_steps() {
             }
         }
         panic!("the body does not follow");
-    });
+    })
+}
+
+/// With rounds one update gets much farther before it must look again.
+#[test]
+fn a_body_that_pivots_needs_fewer_sub_steps() {
+    let substeps = substeps_of_a_pivot(0.5);
     println!("sub-steps for 0 to 2 rounds: {substeps:?}");
     assert!(substeps[1] * 6 < substeps[0] * 5, "{substeps:?}");
     assert!(substeps[2] * 4 < substeps[0] * 3, "{substeps:?}");
+}
+
+/// Over the whole of so long a way the rounds do not come to rest, over half of it they do.
+#[test]
+fn a_way_too_long_for_rounds_is_made_in_halves() {
+    let substeps = substeps_of_a_pivot(1.0);
+    println!("sub-steps for 0 to 2 rounds: {substeps:?}");
+    assert!(substeps[1] < 2 * substeps[0], "{substeps:?}");
+    assert!(substeps[2] < 2 * substeps[0], "{substeps:?}");
 }
 
 /// Far round, each round of the three is longer than the one before: they end anywhere, and the force must then not be theirs.

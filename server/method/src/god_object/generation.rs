@@ -6,6 +6,7 @@ use arrayvec::ArrayVec;
 
 use super::placed_obstacle::Ahead;
 use super::projection::Projected;
+use super::simulation::SET_PERIODS;
 use super::substep::Update;
 use super::{GodObject, StepReport};
 use crate::collision::{MAX_MOTIONS, Work};
@@ -91,8 +92,9 @@ impl GodObject {
                 this.collect_candidates(reduction, at, published, &mut report.work);
             }
         });
-        let reach =
-            self.settings.activation_distance + update.all_moved.min(self.look_ahead_limit());
+        // From where the device is after one period it may go on, or come back, for another.
+        let period = (update.until_next / SET_PERIODS).min(self.look_ahead_limit());
+        let reach = self.settings.activation_distance + period;
         self.wanted =
             self.settings.activation_distance + update.look_ahead.min(self.look_ahead_limit());
         self.choose(difference, reach, &mut report.work);

@@ -48,11 +48,12 @@ impl GodObject {
         }
     }
 
-    /// Until the next set the felt body is between here and where the device goes, and obstacles go as far again: what is farther away changes nothing.
-    pub(super) fn note_far(&mut self, device: &Pose, device_moved: f64) {
+    /// Until the next set the felt body is between here and where the device goes, within `device_next` (m) of its pose, and obstacles go as far again:
+    /// what is farther away changes nothing.
+    pub(super) fn note_far(&mut self, device: &Pose, device_next: f64) {
         let here = self.pose_at_reference_point();
         let left = self.motion_length(&pose_difference(device, &here, &Vector3::zeros()));
-        let reach = self.settings.activation_distance + device_moved + left;
+        let reach = self.settings.activation_distance + device_next + left;
         let center = Point3::from(here.translation.vector);
         for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
             let body = &self.world.body;

@@ -53,11 +53,11 @@ impl GodObject {
     }
 
     /// Moves the obstacles to their targets, and the body out of their way. The longest path asked for of one that is not far from the body and from the
-    /// device (pose of the reference point, and how far it moved, m), and how far the body went along with one, m.
+    /// device (pose of the reference point, and how far it may go, m), and how far the body went along with one, m.
     pub(super) fn carry_obstacles(
         &mut self,
         device: &Pose,
-        device_moved: f64,
+        device_next: f64,
         report: &mut StepReport,
     ) -> (f64, f64) {
         let moved = self.obstacles.iter().any(PlacedObstacle::has_moved);
@@ -99,7 +99,7 @@ impl GodObject {
         report.obstacles_blocked = u32::try_from(blocked).unwrap_or(u32::MAX);
         let distance = self.settings.activation_distance;
         self.collect(distance, &mut report.work);
-        self.note_far(device, device_moved);
+        self.note_far(device, device_next);
         let near = self.obstacles.iter().filter(|o| !o.far);
         let asked = near.map(PlacedObstacle::way).fold(0.0, f64::max);
         (asked, went_along)
@@ -130,6 +130,21 @@ impl GodObject {
             |o: &PlacedObstacle| o.length(&pose_difference(&o.pose, &o.before, &Vector3::zeros()));
         let moving = self.obstacles.iter().filter(|o| o.has_moved() && !o.far);
         moving.map(made).fold(self.longest_way_left(), f64::max)
+    }
+
+    /// Path of the device's fastest point since the last update, m, as seen from the near obstacle from which it is the longest.
+    pub(super) fn way_beside_obstacles(&self, device: &Pose, last: &Pose) -> f64 {
+        let way = |placed: &PlacedObstacle| {
+            if placed.way() == 0.0 {
+                self.motion_length(&self.device_step)
+            } else if placed.far {
+                0.0
+            } else {
+                let (there, before) = (placed.target.inv_mul(device), placed.before.inv_mul(last));
+                self.motion_length(&pose_difference(&there, &before, &Vector3::zeros()))
+            }
+        };
+        self.obstacles.iter().map(way).fold(0.0, f64::max)
     }
 
     fn longest_way_left(&self) -> f64 {

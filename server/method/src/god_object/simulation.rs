@@ -22,6 +22,14 @@ use crate::surface::{Friction, ShadedAcceleration, ShadingNormals};
 use crate::turn_memory::TurnMemory;
 use crate::world::World;
 
+/// Updates' times from a device pose to the last use of the set that answers it: one until it is there, and one until the next is. Where updates take a
+/// part of their time alone, or the caller waits for them, that is more than is needed.
+pub(super) const SET_PERIODS: f64 = 2.0;
+
+/// Most that an update turns the body, rad. A turn is known by where it ends: after half of one, the rotation left to the device and whoever draws the body
+/// would take it for one the other way.
+const LARGEST_TURN: f64 = 1.5;
+
 /// Loop 1 of the method.
 #[derive(Debug)]
 pub struct GodObject {
@@ -178,33 +186,37 @@ impl GodObject {
         let start = self.pose_at_reference_point();
         let device = at_reference_point(device_pose, &self.world.body.reference_point);
         let difference = self.turn.difference(&device, &start);
-        let unconstrained = match shaded {
+        let wish = match shaded {
             Some(pass) if pass.sequence == self.set.sequence => pass.acceleration,
             _ => difference * self.settings.k_s,
         };
         let last = self.last_device.replace(device).unwrap_or(device);
         self.device_step = pose_difference(&device, &last, &Vector3::zeros());
-        let device_moved = self.motion_length(&self.device_step) + self.device_ahead;
+        let device_moved = self.motion_length(&self.device_step);
+        let device_next = SET_PERIODS * device_moved + self.device_ahead;
 
         // What moves by itself comes first: the body is out of its way before it follows the hand.
-        let (obstacle_way, went_along) = self.carry_obstacles(&device, device_moved, &mut report);
+        let (obstacle_way, went_along) = self.carry_obstacles(&device, device_next, &mut report);
         self.begin_carry(&start);
 
         // Where the hand rests, an update that turns back on the last says that the last went too far: sub-steps make the whole way to their goal,
         // so the goal is what comes nearer.
-        if device_moved + obstacle_way > self.settings.rest_distance {
+        if device_moved + self.device_ahead + obstacle_way > self.settings.rest_distance {
             self.rest_memory = StepMemory::default();
         }
-        let unconstrained = unconstrained * self.rest_memory.damping();
+        let part = self.rest_memory.damping() * (LARGEST_TURN / angular(&wish).norm()).min(1.0);
+        let unconstrained = wish * part;
         let goal = advance_pose(&start, &unconstrained, 1.0);
 
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
-        let all_moved = device_moved + obstacle_way;
+        let until_next =
+            SET_PERIODS * self.way_beside_obstacles(&device, &last) + self.device_ahead;
         let mut update = Update {
-            all_moved,
-            moved: all_moved - self.device_ahead,
+            until_next,
+            moved: device_moved + obstacle_way,
             went_along,
-            look_ahead: all_moved,
+            share: self.settings.k_s * part,
+            look_ahead: until_next,
             made: 0.0,
             branch: angular(&unconstrained),
             step_memory: StepMemory::default(),

@@ -26,6 +26,8 @@ const LARGEST_DAMPING: f64 = 16.0;
 const LOST_GAP_SHARE: f64 = 0.5;
 /// One that loses less than this was as the rows predicted.
 const HELD_GAP_SHARE: f64 = 0.1;
+/// Most shares of its way that a sub-step asks for, until rounds come to rest; what the last one gives is cut.
+const MAX_SHARES: u32 = 8;
 /// How much farther the rows are trusted after a motion that was free; after one that was as predicted, so that what one stop took is regained in
 /// two sub-steps and not in six.
 const SLOW_GROWTH: f64 = 2.0;
@@ -34,13 +36,15 @@ const FAST_GROWTH: f64 = 8.0;
 /// What the sub-steps of one update hand on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Update {
-    /// Path of the device and of the fastest obstacle that is near, since the last update, m: they may move as far again until the next.
-    pub(super) all_moved: f64,
-    /// Of that, what is known by its pose; not how much farther than that the device may be.
+    /// Path that the device may make beside an obstacle until the set is replaced, m, both at the speed of the last update.
+    pub(super) until_next: f64,
+    /// Their path since the last update, m.
     pub(super) moved: f64,
     /// How far the body went along with an obstacle, m.
     pub(super) went_along: f64,
-    /// `all_moved`, and what the body may still cover, m: so far the published set must look ahead.
+    /// Share of the way to the device that this update covers.
+    pub(super) share: f64,
+    /// `until_next`, and what the body may still cover, m: so far the published set must look ahead.
     pub(super) look_ahead: f64,
     /// Way made by the sub-steps so far, m.
     pub(super) made: f64,
@@ -93,10 +97,9 @@ impl GodObject {
         let covered = self.motion_length(&projected.acceleration);
         if report.substeps == 1 {
             // This update covers a share of what is free, the next sets must serve the rest.
-            let share = self.settings.k_s * self.rest_memory.damping();
             // The way back from where an obstacle took the body is made at once, and not by a share.
             let shared = (covered - update.went_along).max(0.0);
-            update.look_ahead = update.all_moved + shared * (1.0 - share) / share;
+            update.look_ahead = update.until_next + shared * (1.0 - update.share) / update.share;
         }
         // Projections are non-expansive: of motions up to the device's own, the last one is no cause.
         let follows = update.made == 0.0 && covered <= update.moved;
@@ -174,35 +177,43 @@ impl GodObject {
         true
     }
 
-    /// Eq. (1) for as much of `left` as leads no farther than the linear constraints are trusted for; whether that is less than all.
+    /// Eq. (1) for as much of `left` as leads no farther than the constraints are trusted for; whether that is less than all. Where the rounds of
+    /// re-linearised rows do not come to rest, half of the way is asked for, until they do or the linear rows are true.
     fn project_trusted(
         &mut self,
         left: &Vector6,
         report: &mut StepReport,
     ) -> Option<(Projected, bool)> {
-        self.carry.ask(1.0);
-        self.complete(left, report);
-        let projected = self.project_complete(left, None, report)?;
-        let trusted = if projected.settled {
-            self.trust_length
-        } else {
-            self.trust_length.min(self.straight_length())
-        };
-        let covered = self.motion_length(&projected.acceleration);
-        if covered <= trusted {
-            return Some((projected, false));
+        let straight = self.straight_length();
+        let (mut share, mut asked, mut attempts) = (1.0, f64::INFINITY, 0);
+        loop {
+            attempts += 1;
+            let wish = left * share;
+            self.carry.ask(share);
+            self.complete(&wish, report);
+            let mut projected = self.project_complete(&wish, None, report)?;
+            let covered = self.motion_length(&projected.acceleration);
+            let trusted = if projected.settled {
+                self.trust_length
+            } else {
+                self.trust_length.min(straight)
+            };
+            if covered <= trusted {
+                return Some((projected, attempts > 1));
+            }
+            if asked <= trusted || attempts == MAX_SHARES {
+                // Rows on the way may let a share of the wish go as far as the whole.
+                projected.acceleration *= trusted / covered;
+                self.carry.cut(trusted / covered);
+                return Some((projected, true));
+            }
+            asked = if projected.settled {
+                trusted
+            } else {
+                self.trust_length.min(straight.max(0.5 * covered))
+            };
+            share *= asked / covered;
         }
-        let share = left * (trusted / covered);
-        self.carry.ask(trusted / covered);
-        self.complete(&share, report);
-        let mut projected = self.project_complete(&share, None, report)?;
-        // Rows on the way may let a share of the wish go as far as the whole.
-        let covered = self.motion_length(&projected.acceleration);
-        if covered > trusted {
-            projected.acceleration *= trusted / covered;
-            self.carry.cut(trusted / covered);
-        }
-        Some((projected, true))
     }
 
     /// A motion shorter than this turns no point of the body out of its tangent by more than the rest distance, m: linear rows are true.

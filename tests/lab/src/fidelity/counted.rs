@@ -1,9 +1,7 @@
 //! The method of this project as a session runs it, with its work counted.
 
 use god_object::collision::Work;
-use god_object::spatial::{angular, linear, pose_difference};
 use god_object::{ConstraintSet, Coupling, GodObject, Pose, ShadedAcceleration, Vector6};
-use nalgebra::Vector3;
 
 use crate::method::{HapticMethod, Scene};
 
@@ -13,7 +11,6 @@ pub struct Counted {
     simulation: GodObject,
     coupling: Coupling,
     published: ConstraintSet,
-    last_device: Pose,
     shaded: Option<ShadedAcceleration>,
     moves: bool,
     /// Of all updates so far.
@@ -29,7 +26,6 @@ impl Counted {
             coupling: Coupling::new(&scene.world, &scene.settings),
             published: simulation.constraint_set().clone(),
             simulation,
-            last_device: scene.start,
             shaded: None,
             moves: false,
             work: Work::default(),
@@ -39,11 +35,6 @@ impl Counted {
 
 impl HapticMethod for Counted {
     fn update(&mut self, _time: f64, device: &Pose) {
-        // A set is used from one period after its device pose to two: the device goes on as it came.
-        let moved = pose_difference(device, &self.last_device, &Vector3::zeros());
-        self.last_device = *device;
-        let ahead = linear(&moved).norm() + self.simulation.radius() * angular(&moved).norm();
-        self.simulation.set_device_ahead(ahead);
         self.work += self.simulation.step(device, self.shaded.as_ref()).work;
     }
 

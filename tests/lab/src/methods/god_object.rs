@@ -1,8 +1,6 @@
 //! The god-object method of this project, with whatever settings: its defaults, or as published.
 
-use god_object::spatial::{angular, linear, pose_difference};
 use god_object::{ConstraintSet, Coupling, GodObject, Pose, Settings, ShadedAcceleration, Vector6};
-use nalgebra::Vector3;
 
 use crate::method::{HapticMethod, Scene};
 
@@ -12,7 +10,6 @@ pub struct GodObjectMethod {
     simulation: GodObject,
     coupling: Coupling,
     published: ConstraintSet,
-    last_device: Pose,
     shaded: Option<ShadedAcceleration>,
 }
 
@@ -25,7 +22,6 @@ impl GodObjectMethod {
             coupling: Coupling::new(&scene.world, settings),
             published: simulation.constraint_set().clone(),
             simulation,
-            last_device: scene.start,
             shaded: None,
         }
     }
@@ -33,11 +29,6 @@ impl GodObjectMethod {
 
 impl HapticMethod for GodObjectMethod {
     fn update(&mut self, _time: f64, device: &Pose) {
-        // A set is used from one period after its device pose to two: the device goes on as it came.
-        let moved = pose_difference(device, &self.last_device, &Vector3::zeros());
-        self.last_device = *device;
-        let ahead = linear(&moved).norm() + self.simulation.radius() * angular(&moved).norm();
-        self.simulation.set_device_ahead(ahead);
         let _ = self.simulation.step(device, self.shaded.as_ref());
     }
 
