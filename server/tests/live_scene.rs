@@ -432,10 +432,10 @@ fn of_two_editors_the_later_one_builds_upon_the_first_or_hears_that_it_was_faste
     let scene = served.scene();
     assert_eq!(scene["scene"]["objects"][1]["friction"].to_string(), first);
     assert_eq!(scene["scene"]["objects"][1]["color"], "#30c030");
-    assert_eq!(scene["scene"]["coupling"]["stiffness"], 750.0);
+    assert_eq!(scene["scene"]["coupling"]["stiffness"], 1500.0);
     assert_eq!(
         scene["standing"]["not_kept"].as_array().map(Vec::len),
-        Some(3)
+        Some(4)
     );
     let (code, said) = served.taut_edit(&["--revision", "2", "plate.color=#3030c0"]);
     assert!(

@@ -177,7 +177,7 @@ fn a_recording_that_was_changed_is_found_out() {
 
     // Another stiffness.
     replaced(&path.join("scene.toml"), |text| {
-        text.replace("k_h = 2000.0", "k_h = 1000.0")
+        text.replace("k_h = 1000.0", "k_h = 2000.0")
     });
     match again(&path) {
         Err(error) => assert!(

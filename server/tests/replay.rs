@@ -123,7 +123,7 @@ fn timings_add_two_columns_and_change_no_other() {
 fn overrides_and_solvers_reach_the_method() {
     let force = |more: &[&str]| pressed(more).0["max_force_n"].as_f64().unwrap_or(f64::NAN);
     let plain = force(&[]);
-    let soft = force(&["--set", "coupling.k_h=1000.0"]);
+    let soft = force(&["--set", "coupling.k_h=500.0"]);
     assert!((soft / plain - 0.5).abs() < 1e-3, "{soft} N of {plain} N");
     let reference = force(&["--solver", "clarabel"]);
     assert!(

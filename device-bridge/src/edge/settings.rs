@@ -91,7 +91,7 @@ mod tests {
             rotation_metric: RotationMetric::RadiusOfGyration(0.03),
             adaptation: Some(Adaptation {
                 duration: 0.03,
-                threshold: -2e-3,
+                threshold: -3e-3,
             }),
             look_ahead: !usual.look_ahead,
             passive: !usual.passive,

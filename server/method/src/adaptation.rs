@@ -7,11 +7,12 @@
 //! | b_k       | `bound`                 | m    | where the constraint belongs                             |
 //! | f_k(t)    | [`Ramp::bound`]         | m    | bound in force at time t, rising from d_k to b_k         |
 //! | Delta-t   | `Adaptation::duration`  | s    | time of the rise                                         |
-//! | epsilon   | `Adaptation::threshold` | m    | only `d_k - b_k <= epsilon` is smoothed                  |
+//! | epsilon   | `Adaptation::threshold` | m    | only `d_k - b_k <= k_s epsilon` is smoothed              |
 //!
 //! A constraint that is known by its features keeps its progress when the set is replaced. The paper enters from `J_k a_u`, so that a
 //! body that slides from one triangle to the next loses its force for Delta-t, although nothing is new but the features; c
-//! enters from what the force of the step before already upholds.
+//! enters from what the force of the step before already upholds. The paper compares what is left of the way after the share k_s; here epsilon is the
+//! depth of the device, so that the force at which a constraint is let in does not depend on k_s.
 //! Source: Ortega et al. 2007, Section 5, Figure 6.
 
 use crate::known_rows::KnownRows;
@@ -39,16 +40,19 @@ impl Ramp {
 #[derive(Clone, Debug)]
 pub(crate) struct AdaptationState {
     adaptation: Adaptation,
+    /// Share of the way to the device that an acceleration is, k_s.
+    share: f64,
     /// Rows of the present set that no step has seen yet.
     arrivals: Vec<u32>,
     ramps: Vec<Ramp>,
 }
 
 impl AdaptationState {
-    /// State for sets of at most `capacity` rows.
-    pub(crate) fn new(adaptation: Adaptation, capacity: usize) -> Self {
+    /// State for sets of at most `capacity` rows, where accelerations are a `share` of the way to the device.
+    pub(crate) fn new(adaptation: Adaptation, share: f64, capacity: usize) -> Self {
         Self {
             adaptation,
+            share,
             arrivals: Vec::with_capacity(capacity),
             ramps: Vec::with_capacity(capacity),
         }
@@ -86,7 +90,7 @@ impl AdaptationState {
     ) {
         for row in self.arrivals.drain(..) {
             let reached = reached_by(row as usize);
-            let enters = reached - bound_of(row as usize) <= self.adaptation.threshold
+            let enters = reached - bound_of(row as usize) <= self.share * self.adaptation.threshold
                 && self.ramps.len() < self.ramps.capacity();
             if enters {
                 self.ramps.push(Ramp {

@@ -2,14 +2,14 @@
 //!
 //! | symbol   | name in code                    | unit  | paper   | meaning                                            |
 //! |----------|---------------------------------|-------|---------|----------------------------------------------------|
-//! | k_s      | [`Settings::k_s`]               | –     | 0.5     | share of the pose difference covered in one update |
+//! | k_s      | [`Settings::k_s`]               | –     | 1 (0.5) | share of the pose difference covered in one update |
 //! | k_h      | [`Settings::k_h`]               | 1/s^2 | –       | coupling constant                                  |
 //! | tau      | [`Settings::damping_time`]      | s     | –       | damping of a contact over its stiffness            |
 //! | K_t      | [`Settings::stiffness`]         | N/m   | –       | k_h k_s m: what the hand feels in translation      |
 //! | delta_c  | [`Settings::rest_distance`]     | m     | –       | gap at which the god-object rests                  |
 //! | delta_min| [`Settings::minimum_gap`]       | m     | –       | gap below which it never comes                     |
 //! | Delta-t  | [`Adaptation::duration`]        | s     | –       | time over which a violated new constraint enters   |
-//! | epsilon  | [`Adaptation::threshold`]       | m     | < 0     | violations smaller than this enter at once         |
+//! | epsilon  | [`Adaptation::threshold`]       | m     | < 0     | new constraints less deep than this enter at once  |
 //!
 //! Source: Ortega et al. 2007, Sections 4, 5 and 6. The lengths derive from one: the size of the body.
 
@@ -53,16 +53,16 @@ pub enum RotationMetric {
 pub struct Adaptation {
     /// Time over which the bound rises from where the device is to its place, s.
     pub duration: f64,
-    /// Negative, m. A violation smaller than its magnitude enters at once, so that a new contact is felt.
+    /// Negative, m. Where the device is less deep in a new constraint than its magnitude, that enters at once, so that a new contact is felt.
     pub threshold: f64,
 }
 
 impl Default for Adaptation {
-    /// 20 ms, 1 mm.
+    /// 20 ms, 2 mm: the paper's 1 mm of a way of which its updates cover half.
     fn default() -> Self {
         Self {
             duration: 0.02,
-            threshold: -1e-3,
+            threshold: -2e-3,
         }
     }
 }
@@ -127,8 +127,8 @@ impl Settings {
     /// Defaults for a body whose bounding box has the longest side `size`, in metres.
     pub fn for_size(size: f64) -> Self {
         Self {
-            k_s: 0.5,
-            k_h: 2000.0,
+            k_s: 1.0,
+            k_h: 1000.0,
             damping_time: 0.0,
             rotation_metric: RotationMetric::Inertia,
             adaptation: Some(Adaptation::default()),
@@ -189,6 +189,8 @@ impl Settings {
     /// The method as published: a cone of touching contacts, one projection and one collision search per update.
     pub fn paper(size: f64) -> Self {
         Self {
+            k_s: 0.5,
+            k_h: 2000.0,
             look_ahead: false,
             max_substeps: 1,
             implicit_rounds: 0,

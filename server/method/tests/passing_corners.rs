@@ -84,7 +84,11 @@ fn corners_that_pass_each_other_are_not_felt() {
         for phase in 0..UPDATE {
             for tick in felt([beside, 2e-3], [0.0, -1.0], 0.06, phase) {
                 let felt = tick.force.norm();
-                assert_eq!(felt, 0.0, "N, {beside} m beside, {} m above", tick.above);
+                assert!(
+                    felt < 1e-12,
+                    "{felt:e} N, {beside} m beside, {} m above",
+                    tick.above
+                );
             }
         }
     }

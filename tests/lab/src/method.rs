@@ -39,6 +39,9 @@ pub trait HapticMethod {
     fn move_obstacle(&mut self, _pose: &Pose) {}
 }
 
+/// Share of the way to the device that the published method's body covers in an update, k_s.
+pub(crate) const PUBLISHED_SHARE: f64 = 0.5;
+
 /// A body, its obstacles, a free start, and the settings that every method takes its gains and limits from.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -178,7 +181,7 @@ impl Method {
             look_ahead: false,
             max_substeps: 1,
             implicit_rounds: 0,
-            ..by_default
+            ..with_share(by_default, way.unwrap_or(PUBLISHED_SHARE))
         };
         match self {
             Self::Ours => {
@@ -248,9 +251,8 @@ mod tests {
             look_ahead: false,
             max_substeps: 1,
             implicit_rounds: 0,
-            ..ours
+            ..with_share(ours, PUBLISHED_SHARE)
         };
         assert_eq!(paper, Settings::paper(size));
-        assert_eq!(paper.k_s, 0.5);
     }
 }

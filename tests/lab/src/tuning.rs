@@ -12,8 +12,8 @@ const TOUCHING_FARTHEST: f64 = 1600.0;
 /// Rest distances over the default that discrete detection is tried with while it looks ahead, and steps within an update.
 const TOUCHING_AHEAD: [f64; 3] = [1.0, 25.0, 400.0];
 const STEPS_AHEAD: [u32; 2] = [1, 10];
-/// Share of the way to the device that a body which looks ahead is tried with beside the default, k_s: all of it.
-const WHOLE_WAY: f64 = 1.0;
+/// Share of the way to the device that a body which looks ahead is tried with beside the default, k_s: that of the published method.
+const SHORTER_WAY: f64 = 0.5;
 /// Inertias and damping ratios that are tried for virtual coupling. Less inertia than none there is not: the proxy is where the spring is at rest.
 pub(crate) const PROXIES: [(f64, f64); 6] = [
     (0.02, 1.0),
@@ -36,7 +36,7 @@ impl Method {
     pub fn tunings(self) -> Vec<Tuning> {
         match self {
             Self::OursByDefault | Self::DoesNothing | Self::RandomForce => vec![Tuning::Default],
-            Self::Ours => vec![Tuning::Default, Tuning::Way(WHOLE_WAY)],
+            Self::Ours => vec![Tuning::Default, Tuning::Way(SHORTER_WAY)],
             Self::Paper | Self::PaperAdapted => {
                 let farthest = Tuning::Touching(TOUCHING_FARTHEST);
                 touching().chain([farthest]).collect()
@@ -45,7 +45,7 @@ impl Method {
                 let each = |share: &f64| {
                     let share = *share;
                     STEPS_AHEAD.map(|steps| {
-                        [None, Some(WHOLE_WAY)].map(|way| Tuning::Ahead { share, steps, way })
+                        [None, Some(SHORTER_WAY)].map(|way| Tuning::Ahead { share, steps, way })
                     })
                 };
                 let ahead = TOUCHING_AHEAD.iter().flat_map(each).flatten();

@@ -48,7 +48,7 @@ fn a_hand_that_presses_a_tight_fit_aslant_feels_the_walls_that_are_not_yet_touch
         let variant = variants.iter().find(|v| v.name == name).expect("a variant");
         let outcome = run(variant, &course, &mut oracle, || 0.0);
         let error = outcome.errors.iter().copied().fold(0.0, f64::max);
-        assert!(error <= 0.01, "{error} {variant:?}");
+        assert!(error <= 0.02, "{error} {variant:?}");
         assert_eq!(
             (outcome.penetrations, outcome.failures),
             (0, 0),

@@ -109,7 +109,7 @@ impl Coupling {
             bounds: Vec::with_capacity(capacity),
             adaptation: settings
                 .adaptation
-                .map(|a| AdaptationState::new(a, capacity)),
+                .map(|a| AdaptationState::new(a, settings.k_s, capacity)),
             warm_start: Vec::with_capacity(capacity.min(6)),
             turn: TurnMemory::default(),
             correction: Vector6::zeros(),

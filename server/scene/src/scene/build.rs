@@ -361,7 +361,7 @@ impl Scene {
             // A budget of time is kept, not only hoped for.
             settings.work_budget = auto.plan.time_us.map(|time| time.ceil() as u64);
         }
-        self.spec.coupling.apply(&mut settings);
+        self.spec.coupling.pair(size).apply(&mut settings);
         self.spec.limits.apply(&mut settings);
         self.spec.method.apply(&mut settings);
         settings.validate().map_err(|error| {

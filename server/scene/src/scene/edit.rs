@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use god_object::Settings;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::built::GOD_OBJECT_NAME;
@@ -114,6 +115,9 @@ impl Scene {
         for edit in edits {
             keys.push(self.apply(&mut document, edit.as_ref())?);
         }
+        if let Some(other) = self.other_gain(&keys) {
+            keys.push(self.apply(&mut document, &other)?);
+        }
         let mut text = document.to_string();
         if self.text().contains("\r\n") {
             // The editor of documents ends every line by itself.
@@ -134,6 +138,19 @@ impl Scene {
             _ => error,
         })?;
         Ok((edited, keys))
+    }
+
+    /// Where one of the gains is set and the scene has neither: the other as it runs, which is not as it is read beside a gain that is written.
+    fn other_gain(&self, keys: &[EditedKey]) -> Option<String> {
+        let is_set = |key: &str| keys.iter().any(|set| set.key == key);
+        let of = self.coupling();
+        let neither = of.k_s.is_none() && of.k_h.is_none();
+        let usual = Settings::for_size(1.0);
+        match (is_set("coupling.k_s"), is_set("coupling.k_h")) {
+            (true, false) if neither => Some(format!("coupling.k_h={:?}", usual.k_h)),
+            (false, true) if neither => Some(format!("coupling.k_s={:?}", usual.k_s)),
+            _ => None,
+        }
     }
 
     fn apply(&self, document: &mut DocumentMut, edit: &str) -> Result<EditedKey, FileError> {

@@ -55,6 +55,19 @@ settings_table! {
     }
 }
 
+impl CouplingSpec {
+    /// The same with both gains where one is written: the other is the published one. The stiffness is their product, and a scene from when these were
+    /// the defaults must not become twice as stiff.
+    pub(super) fn pair(mut self, size: f64) -> Self {
+        let published = Settings::paper(size);
+        if self.k_s.is_some() != self.k_h.is_some() {
+            self.k_s.get_or_insert(published.k_s);
+            self.k_h.get_or_insert(published.k_h);
+        }
+        self
+    }
+}
+
 settings_table! {
     /// `[limits]`; what is `None` keeps the method's default.
     pub struct LimitSpec {

@@ -80,6 +80,8 @@ fn what_is_set_is_read_and_all_else_stays_as_it_was_written() {
     assert_eq!((plate.surface.friction, far.surface.friction), (0.5, 0.7));
     assert_eq!(far.pose.translation.vector.z, -2.0);
     assert_eq!(edited.coupling().k_h, Some(1500.0));
+    // As it ran: beside a gain that is written, one that is not would be another.
+    assert_eq!(edited.coupling().k_s, Some(1.0));
     assert_eq!(edited.god_object().appearance.opacity, Some(0.5));
     assert!(edited.scenery()[0].appearance.color.is_some());
     assert_eq!(keys[2].to_string(), "plate.surface.friction: 0.2 -> 0.5");
@@ -107,6 +109,7 @@ fn what_is_set_is_read_and_all_else_stays_as_it_was_written() {
         "surface = { friction = 0.7 }",
         "[coupling]",
         "k_h = 1500",
+        "k_s = 1.0",
     ] {
         assert!(new.contains(&line), "{line} in {new:#?}");
     }

@@ -323,6 +323,22 @@ fn an_open_mesh_is_refused_with_the_place() {
     assert!(found.starts_with("s.toml:3: the mesh \"open.obj\" cannot be used: 3 edges have one triangle only, the first about (0.50000, 0.00000, 0.00000) m"), "{found}");
 }
 
+/// The stiffness is the product of both gains, whose defaults were 0.5 and 2000 once: no scene of then is another one now.
+#[test]
+fn a_gain_that_is_not_written_leaves_the_stiffness_as_it_was() {
+    let gains = |k_s: &str, k_h: &str| {
+        let text = GOOD
+            .replace("k_s = 0.5\n", k_s)
+            .replace("k_h = 2000.0\n", k_h);
+        let settings = parse(&text).unwrap().build().unwrap().settings;
+        (settings.k_s, settings.k_h)
+    };
+    assert_eq!(gains("", ""), (1.0, 1000.0));
+    assert_eq!(gains("", "k_h = 1500.0\n"), (0.5, 1500.0));
+    assert_eq!(gains("k_s = 0.25\n", ""), (0.25, 2000.0));
+    assert_eq!(gains("k_s = 0.25\n", "k_h = 300.0\n"), (0.25, 300.0));
+}
+
 #[test]
 fn overrides_change_any_key_and_are_checked_like_the_file() {
     let scene = parse(GOOD).unwrap();

@@ -134,9 +134,9 @@ fn an_adaptation_that_says_one_number_has_the_other_of_the_page() {
         let adaptation = settings.adaptation.unwrap();
         (adaptation.duration, adaptation.threshold)
     };
-    assert_eq!(adaptation(""), (0.02, -1e-3));
+    assert_eq!(adaptation(""), (0.02, -2e-3));
     let longer = adaptation("adaptation = { duration = 0.05 }");
-    assert_eq!(longer, (0.05, -1e-3));
+    assert_eq!(longer, (0.05, -2e-3));
     let finer = adaptation("adaptation = { threshold = -1e-4 }");
     assert_eq!(finer, (0.02, -1e-4));
 }

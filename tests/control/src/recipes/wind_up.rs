@@ -136,9 +136,9 @@ pub fn run() -> Vec<Row> {
     let mut rows = Vec::new();
     for turn in TURNS {
         let (seen, rotational) = lead(turn);
-        // The bound of the conventions, 1.5 K v T, for the turn; at a whole turn the bar changes stops, across its play.
+        // The bound of the conventions, 1.5 K v T, for the turn; at a whole turn the bar changes stops, across its play, and may do so in one update.
         let crossed = if turn < TAU { 0.0 } else { play };
-        let allowed = rotational * (1.5 * SPEED * PERIOD.as_secs_f64() + crossed);
+        let allowed = rotational * 1.5 * (SPEED * PERIOD.as_secs_f64() + crossed);
         let degrees = turn.to_degrees().round();
         let mut at_most = |case: &str, measured: f64, limit: f64, unit: &str| {
             let case = format!("{degrees} deg: {case}");

@@ -6,7 +6,7 @@ use crate::costs;
 use crate::cpu_time::quantile;
 use crate::measure::Measure;
 use crate::measured::{Measured, judged};
-use crate::method::{Method, Tuning};
+use crate::method::{Method, PUBLISHED_SHARE, Tuning};
 use crate::outcome::Outcome;
 use crate::recipe::Recipe;
 
@@ -133,7 +133,7 @@ pub(super) fn behind(cylinder: &Recipe) -> Figure {
     let tuning = Tuning::Touching(400.0);
     let start = || Method::Paper.start(&cylinder.scene, 1.0 / f64::from(RATE), tuning);
     let measured = Measured::of(cylinder, RATE, &judged(1), None, start);
-    let share = cylinder.scene.settings.k_s * (1.0 - DEEP / RADIUS);
+    let share = PUBLISHED_SHARE * (1.0 - DEEP / RADIUS);
     let behind = ((1.0 / share + 0.5) * SPEED / (RADIUS * f64::from(RATE))).to_degrees();
     Figure {
         method: Method::Paper,

@@ -6,8 +6,8 @@ use nalgebra::{Point3, Vector3};
 use super::Extent;
 use super::bodies::{Path, block, cube, cube_mesh, force, smooth, sound};
 use crate::measure::Measure;
-use crate::method::{Method, Scene};
-use crate::recipe::{Ideal, Line, Open, Recipe};
+use crate::method::Scene;
+use crate::recipe::{Ideal, Line, Recipe};
 use crate::vertex_depth::Convex;
 
 const HALF: f64 = 0.5e-3;
@@ -51,16 +51,6 @@ fn recipe(extent: Extent, speed: f64) -> Recipe {
                 above.abs()
             }
         }),
-        open: if speed > 2.0 {
-            vec![Open {
-                key: Measure::JndShare.key(),
-                method: Method::OursByDefault,
-                rate: 1000,
-                reason: "its look-ahead follows the size of the body, not the speed of the device",
-            }]
-        } else {
-            Vec::new()
-        },
         phases: extent.choose(20, 4),
         lines: Box::new(move |_| {
             let mut lines = sound();
