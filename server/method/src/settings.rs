@@ -2,7 +2,7 @@
 //!
 //! | symbol   | name in code                    | unit  | paper   | meaning                                            |
 //! |----------|---------------------------------|-------|---------|----------------------------------------------------|
-//! | k_s      | [`Settings::k_s`]               | –     | 1 (0.5) | share of the pose difference covered in one update |
+//! | k_s      | [`Settings::k_s`]               | –     | 0.5     | share of the pose difference covered in one update |
 //! | k_h      | [`Settings::k_h`]               | 1/s^2 | –       | coupling constant                                  |
 //! | tau      | [`Settings::damping_time`]      | s     | –       | damping of a contact over its stiffness            |
 //! | K_t      | [`Settings::stiffness`]         | N/m   | –       | k_h k_s m: what the hand feels in translation      |

@@ -16,6 +16,7 @@ fn a_bunny_that_slides_over_another_is_felt_as_by_every_pair() {
         let shown = [0.9, 0.98, 0.99, 1.0].map(at);
         println!("{}: {} sets, off by {shown:?}", slide.name, errors.len());
         assert!(at(0.98) <= 0.01, "{}: off by {shown:?}", slide.name);
+        assert!(at(0.99) <= 0.0125, "{}: off by {shown:?}", slide.name);
         assert!(at(1.0) <= 0.25, "{}: off by {shown:?}", slide.name);
     }
 }

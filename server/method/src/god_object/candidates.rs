@@ -19,9 +19,9 @@ impl GodObject {
         self.set.gap_min = f64::INFINITY;
         let share = self.share();
         let (mut looked_at, mut left, mut even) = (0, self.settings.look_ahead_pairs, None);
-        self.note_turns(at);
-        for turn in 0..self.turns.len() {
-            let index = self.turns[turn];
+        self.note_order(at);
+        for place in 0..self.order.len() {
+            let index = self.order[place];
             if !at.places[index].chosen {
                 continue;
             }
@@ -45,12 +45,12 @@ impl GodObject {
         self.set.gap_min = self.set.gap_min.min(gap_min);
     }
 
-    /// In which order the obstacles have their turn.
-    fn note_turns(&mut self, at: &At) {
+    /// Sorts the obstacles by what their last collection took, then by how far their origins are from the body.
+    fn note_order(&mut self, at: &At) {
         let body = &at.reference.translation.vector;
         let off = |index: usize| (at.places[index].pose.translation.vector - body).norm();
         let looked_at = &self.looked_at;
-        self.turns.sort_unstable_by(|a, b| {
+        self.order.sort_unstable_by(|a, b| {
             let needed = looked_at[*a].cmp(&looked_at[*b]);
             needed.then_with(|| off(*a).total_cmp(&off(*b)))
         });

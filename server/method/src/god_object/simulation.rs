@@ -22,8 +22,8 @@ use crate::surface::{Friction, ShadedAcceleration, ShadingNormals};
 use crate::turn_memory::TurnMemory;
 use crate::world::World;
 
-/// Updates' times from a device pose to the last use of the set that answers it: one until it is there, and one until the next is. Where updates take a
-/// part of their time alone, or the caller waits for them, that is more than is needed.
+/// Update periods from a device pose to the last use of the set that answers it: one until the set is there, and one until the next is. Where an update
+/// takes less than a period, or the caller waits for it, that is more than is needed.
 pub(super) const SET_PERIODS: f64 = 2.0;
 
 /// Most that an update turns the body, rad. A turn is known by where it ends: after half of one, the rotation left to the device and whoever draws the body
@@ -74,7 +74,7 @@ pub struct GodObject {
     /// Pairs that the last collection of each obstacle looked at.
     pub(super) looked_at: Vec<u64>,
     /// The obstacles, those first whose last collection looked at the fewest pairs.
-    pub(super) turns: Vec<usize>,
+    pub(super) order: Vec<usize>,
     /// Rows of those obstacles that are not chosen from.
     pub(super) given: GivenRows,
 }
@@ -106,7 +106,7 @@ impl GodObject {
                 })
                 .collect(),
             looked_at: vec![0; obstacles],
-            turns: (0..obstacles).collect(),
+            order: (0..obstacles).collect(),
             given: GivenRows::with_capacity(capacity),
             world,
             settings,

@@ -181,16 +181,11 @@ pub(super) fn knob_face(a: &Knob, mesh: &Mesh, t: u32) -> Option<Row> {
     if !is_over(&a.at, &corners, &normal, height) || !a.cone.holds(&-normal, LOOK_AHEAD_TILT) {
         return None;
     }
-    let foot = a.at - normal * height;
-    Some(Row::between(
-        [a.feature, Feature::Face(t)],
-        [a.at, foot],
-        [a.round, 0.0],
-        normal,
-    ))
+    Some(row_over_face(a, t, &normal, height))
 }
 
-/// A ball past the end of a face, over others that are implied to hold it back before it ([`covers_ball`]), and at most `within` from its plane, m.
+/// A ball past the end of a face, where the rows of the faces that it is over imply that of this one ([`covers_ball`]), and at most `within` from its
+/// plane, m.
 pub(super) fn knob_past_face(a: &Knob, mesh: &Mesh, t: u32, within: f64) -> Option<Row> {
     let (corners, normal) = (mesh.corners(t), *mesh.face_normal(t));
     let height = normal.dot(&(a.at - corners[0]));
@@ -200,14 +195,17 @@ pub(super) fn knob_past_face(a: &Knob, mesh: &Mesh, t: u32, within: f64) -> Opti
         && gap <= within // false for NaN
         && a.cone.holds(&-normal, LOOK_AHEAD_TILT)
         && covers_ball(mesh, t, &a.at);
-    past.then(|| {
-        Row::between(
-            [a.feature, Feature::Face(t)],
-            [a.at, a.at - normal * height],
-            [a.round, 0.0],
-            normal,
-        )
-    })
+    past.then(|| row_over_face(a, t, &normal, height))
+}
+
+/// The row of a point `height` (m) above the plane of triangle `t`.
+fn row_over_face(a: &Knob, t: u32, normal: &Vector3<f64>, height: f64) -> Row {
+    Row::between(
+        [a.feature, Feature::Face(t)],
+        [a.at, a.at - normal * height],
+        [a.round, 0.0],
+        *normal,
+    )
 }
 
 /// A point over a half-space.
