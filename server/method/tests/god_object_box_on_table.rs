@@ -133,6 +133,46 @@ fn look_ahead_makes_the_force_grow_smoothly_at_any_update_rate() {
     }
 }
 
+/// A set is used until the second update after its own: one is made meanwhile, and one travels.
+#[test]
+fn a_cube_of_a_millimetre_is_felt_where_it_crosses_at_any_speed_and_rate() {
+    const HALF: f64 = 5e-4;
+    let mut world = World::clone(&box_on_table());
+    world.body = box_body(Vector3::repeat(HALF));
+    let world = Arc::new(world);
+    let settings = Settings::for_size(2.0 * HALF);
+    let speeds = [0.5, 2.0, 5.0];
+    for (period_ms, speed) in [1, 3, 14].into_iter().flat_map(|p| speeds.map(|v| (p, v))) {
+        for phase in 0..period_ms {
+            // In free space for long enough that the speed is known.
+            let height = |t: f64| 0.4 - speed * (t - 1e-3 * f64::from(phase));
+            let mut god_object =
+                GodObject::new(world.clone(), settings, at(0.0, 0.0, height(0.0))).expect("free");
+            let mut coupling = Coupling::new(&world, &settings);
+            let mut used = god_object.constraint_set().clone();
+            let samples = (0.43 / speed * 1e3) as u32 + period_ms;
+            let mut largest = 0.0;
+            for i in 0..samples {
+                let t = f64::from(i) * 1e-3;
+                let device = at(0.0, 0.0, height(t));
+                if i % period_ms == 0 {
+                    used = god_object.constraint_set().clone();
+                    god_object.step(&device, None);
+                }
+                let force = coupling.step(t, &device, &used).wrench[2];
+                let depth = HALF + settings.rest_distance - height(t);
+                let right = (STIFFNESS * depth).clamp(0.0, settings.force_limit);
+                assert!(
+                    (force - right).abs() < 1e-6,
+                    "{period_ms} ms, {speed} m/s, phase {phase}: {force} N at {t}, and not {right}"
+                );
+                largest = right.max(largest);
+            }
+            assert_eq!(largest, settings.force_limit);
+        }
+    }
+}
+
 #[test]
 fn a_body_at_rest_does_not_move_by_a_single_bit() {
     let (mut god_object, mut coupling, _) = loops();

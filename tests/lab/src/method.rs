@@ -10,9 +10,6 @@ use crate::methods::{
 use crate::tuning::{PROXIES, SHELL_SPACINGS, TOUCH_SHARES};
 pub use crate::tuning::{ShellForce, Tuning};
 
-/// How far this project's method looks ahead: as far as the device goes in this many periods. 1/k_s that the body lags behind it, one while
-/// an update is made, and one while it is used.
-const LOOK_AHEAD_PERIODS: f64 = 4.0;
 /// Share of the time between updates that this project's method may spend on looking ahead, and what a pair of triangles takes, nominally, s
 /// ([`Work`](god_object::collision::Work)).
 const LOOK_AHEAD_SHARE: f64 = 0.1;
@@ -67,13 +64,10 @@ impl Scene {
         }
     }
 
-    /// The settings of [`Method::Ours`]: how far it looks ahead is fitted to the speed of the device and the time between updates, s, and
-    /// how many pairs it may look at for that to this time.
+    /// The settings of [`Method::Ours`]: how many pairs it may look at to look ahead is fitted to the time between updates, s.
     pub fn fitted(&self, period: f64) -> Settings {
-        let reach = LOOK_AHEAD_PERIODS * self.speed * period;
         let pairs = (LOOK_AHEAD_SHARE * period / PAIR_TIME) as u64;
         Settings {
-            look_ahead_limit: self.settings.look_ahead_limit.max(reach),
             look_ahead_pairs: self.settings.look_ahead_pairs.max(pairs),
             ..self.settings
         }
@@ -97,9 +91,9 @@ pub(crate) fn with_share(given: Settings, share: f64) -> Settings {
 /// The methods that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// This project's, its look-ahead fitted to the speed of the device and the rate of updates.
+    /// This project's, the work of its look-ahead fitted to the rate of updates.
     Ours,
-    /// This project's, with its default settings, whose look-ahead is fitted to the size of the body alone.
+    /// This project's, with its default settings.
     OursByDefault,
     /// As published, without the adaptation of constraints: a cone of touching contacts, one projection and one collision
     /// search in an update.
@@ -211,7 +205,7 @@ impl Method {
             }
             Self::Discrete => {
                 let (look_ahead_limit, max_substeps) = match tuning {
-                    Tuning::Ahead { steps, .. } => (scene.fitted(period).look_ahead_limit, steps),
+                    Tuning::Ahead { steps, .. } => (scene.settings.look_ahead_limit, steps),
                     _ => (0.0, 1),
                 };
                 let settings = Settings {

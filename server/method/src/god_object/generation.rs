@@ -93,10 +93,10 @@ impl GodObject {
             }
         });
         // From where the device is after one period it may go on, or come back, for another.
-        let period = (update.until_next / SET_PERIODS).min(self.look_ahead_limit());
+        let period = (update.until_next / SET_PERIODS).min(self.settings.look_ahead_limit);
         let reach = self.settings.activation_distance + period;
-        self.wanted =
-            self.settings.activation_distance + update.look_ahead.min(self.look_ahead_limit());
+        self.wanted = self.settings.activation_distance
+            + update.look_ahead.min(self.settings.look_ahead_limit);
         self.choose(difference, reach, &mut report.work);
     }
 

@@ -15,18 +15,12 @@ pub(super) const TOUCHING_REST_DISTANCES: f64 = 2.0;
 
 impl GodObject {
     /// The body's fastest point at the device may be up to `distance` (m) from where the device pose of the next updates puts it, by the
-    /// time at which their sets are used: the pose came late, or the sets travel. They look ahead that much farther, also beyond
-    /// [`Settings::look_ahead_limit`](crate::Settings::look_ahead_limit), as far as the work allows.
+    /// time at which their sets are used: the pose came late, or the sets travel. They look ahead that much farther, as far as the work allows.
     ///
     /// What is not a positive finite number counts as zero.
     pub fn set_device_ahead(&mut self, distance: f64) {
         let ahead = distance.is_finite() && distance > 0.0;
         self.device_ahead = if ahead { distance } else { 0.0 };
-    }
-
-    /// Most that look-ahead adds to the activation distance, m.
-    pub(super) fn look_ahead_limit(&self) -> f64 {
-        self.settings.look_ahead_limit.max(self.device_ahead)
     }
 
     /// The point G of the body, in its own frame, m.
@@ -70,7 +64,7 @@ impl GodObject {
         } else if pairs < self.settings.look_ahead_pairs / 4 {
             self.affordable = (self.affordable * LOOK_AHEAD_GROWS)
                 .max(self.settings.activation_distance)
-                .min(self.look_ahead_limit());
+                .min(self.settings.look_ahead_limit);
         }
     }
 }
