@@ -1,8 +1,8 @@
-//! Where the ball is pressed: on a wall, into a corner, and in a hollow, along which the contact turns.
+//! Where the ball is pressed: on a wall, into a corner, and in a hollow, along which the contact turns, there as an exact ball and as a mesh.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use god_object::{Pose, Settings, World};
+use god_object::{Body, Obstacle, Pose, Settings, World};
 use nalgebra::{Point3, Vector3};
 use taut_method_tests::solids::{mesh, obstacle};
 use taut_scene::shapes::{Axis, box_with_hole};
@@ -36,6 +36,8 @@ pub enum Contact {
     Corner,
     /// The inside of a cylinder about y: the ball moves along x, and the normal turns with it.
     Hollow,
+    /// The same, and the ball is a mesh of 320 triangles.
+    MeshInHollow,
 }
 
 /// A ball that is pressed and disturbed.
@@ -58,7 +60,7 @@ impl Contact {
         let above = RADIUS + DISTURBANCE;
         match self {
             Self::Wall => Pressed {
-                scene: scene(vec![ground()], stiffness, above * z),
+                scene: scene((ball(RADIUS), vec![ground()]), stiffness, above * z),
                 push: -PUSH * z,
                 at_rest: (RADIUS - PUSH / stiffness) * z,
                 disturbance: -DISTURBANCE * z,
@@ -69,19 +71,23 @@ impl Contact {
                 let walls = vec![ground(), block("side", low, high)];
                 let push = PUSH * FRAC_1_SQRT_2;
                 Pressed {
-                    scene: scene(walls, stiffness, above * (x + z)),
+                    scene: scene((ball(RADIUS), walls), stiffness, above * (x + z)),
                     push: -push * (x + z),
                     at_rest: (RADIUS - push / stiffness) * (x + z),
                     disturbance: -DISTURBANCE * (0.8 * x + 0.6 * z),
                     free: x + z,
                 }
             }
-            Self::Hollow => {
+            Self::Hollow | Self::MeshInHollow => {
                 let hole = box_with_hole([BLOCK; 3], HOLLOW, FACETS, Axis::Y);
                 let walls = vec![obstacle("hollow", mesh(hole), Pose::identity())];
                 let down = (HOLLOW - RADIUS) / (1.0 - DEPTH_SHARE);
+                let mut body = ball(RADIUS);
+                if self == Self::MeshInHollow {
+                    body.primitive = None;
+                }
                 Pressed {
-                    scene: scene(walls, stiffness / DEPTH_SHARE, Vector3::zeros()),
+                    scene: scene((body, walls), stiffness / DEPTH_SHARE, Vector3::zeros()),
                     push: -stiffness * down * z,
                     at_rest: -down * z,
                     disturbance: DISTURBANCE_ALONG * x,
@@ -92,11 +98,8 @@ impl Contact {
     }
 }
 
-fn scene(obstacles: Vec<god_object::Obstacle>, stiffness: f64, start: Vector3<f64>) -> Scene {
-    let world = World {
-        body: ball(RADIUS),
-        obstacles,
-    };
+fn scene((body, obstacles): (Body, Vec<Obstacle>), stiffness: f64, start: Vector3<f64>) -> Scene {
+    let world = World { body, obstacles };
     let mut scene = Scene::new(world, 2.0 * RADIUS, 0.1, Pose::from(start));
     let mass = scene.world.body.mass;
     scene.settings = Settings {

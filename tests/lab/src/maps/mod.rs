@@ -107,7 +107,7 @@ pub struct Map {
 const RATES: [f64; 5] = [70.0, 140.0, 300.0, 500.0, 1000.0];
 
 /// All.
-pub const MAPS: [Map; 7] = [
+pub const MAPS: [Map; 8] = [
     Map {
         name: "delay",
         axis: "delay of the force, ms",
@@ -147,8 +147,18 @@ pub const MAPS: [Map; 7] = [
         },
     },
     Map {
+        name: "turning-mesh",
+        axis: "updates of the method, Hz, for a ball of 320 triangles in that hollow",
+        values: &RATES,
+        at: |hz| Conditions {
+            contact: Contact::MeshInHollow,
+            updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
         name: "way",
-        axis: "share k_s of the way to the device that a god-object covers, in a hollow at 300 Hz",
+        axis: "share k_s of the way that an update covers, in a hollow at 300 Hz",
         values: &[0.25, 0.5, 0.75, 1.0],
         at: |k_s| Conditions {
             contact: Contact::Hollow,
