@@ -51,7 +51,7 @@ def draw(rows, path):
         side.set_visible(False)
     right.set_title("J, 95th percentile: green within the budget of 0.5, red above 1, grey not run; *: several places of rest, not counted", y=-0.08, fontsize=9)
     figure.tight_layout()
-    figure.savefig(path, metadata={"Date": None})
+    figure.savefig(path, metadata={"Date": None}, bbox_inches="tight")
     print(table(order, scenes, by))
 
 
