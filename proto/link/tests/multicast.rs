@@ -176,9 +176,9 @@ async fn one_datagram_serves_all_who_hear_the_group() {
             drain(client);
             tick = take_states(&server, client, tick, 100).await;
         }
-        assert!(server.counters().multicast_sent >= multicast_before + 400);
         // A time response now and then, but no states. A starved machine makes a group silent, or takes long for the few states.
-        if lost() == lost_before
+        if server.counters().multicast_sent >= multicast_before + 400
+            && lost() == lost_before
             && unicast_states(&server, &["left", "right"]) < unicast_before + 200
         {
             break;
