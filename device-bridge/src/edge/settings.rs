@@ -146,6 +146,16 @@ mod tests {
     }
 
     #[test]
+    fn default_settings_travel_for_every_size_of_body() {
+        for size in [1e-6, 1e-3, 0.1, 1e3, 1e5] {
+            let settings = Settings::for_size(size);
+            let wire = to_wire(&settings).expect("at the edge");
+            let back = from_wire(&through_the_wire(offer(wire)).settings).expect("in range");
+            assert_eq!(back, settings, "{size} m");
+        }
+    }
+
+    #[test]
     fn every_setting_comes_through_the_wire() {
         let plain = Settings {
             rotation_metric: RotationMetric::Inertia,

@@ -30,6 +30,8 @@ const ACTIVATION_DISTANCE_PER_SIZE: f64 = 4e-3;
 /// Longest look-ahead per metre of body size: what it may cost is bounded by `look_ahead_pairs`, so that this binds nobody but a device that
 /// jumps. A cube of 1 mm at 5 m/s and 70 updates a second goes 143 of its lengths while a set is used.
 const LOOK_AHEAD_LIMIT_PER_SIZE: f64 = 1000.0;
+/// Longest look-ahead of any body, m: what the settings' message to a device bridge may hold.
+const LONGEST_LOOK_AHEAD: f64 = 1e6;
 /// Rest distance per clearance of the tightest fit: two walls take a fifth of the play, and what is left is played in.
 const REST_DISTANCE_PER_CLEARANCE: f64 = 0.1;
 /// Share of the rest distance below which a motion is none: keeps the god-object bit-identical at rest.
@@ -140,7 +142,7 @@ impl Settings {
             minimum_gap: MINIMUM_GAP_PER_SIZE * size,
             gap_tolerance: 0.1 * MINIMUM_GAP_PER_SIZE * size,
             activation_distance: ACTIVATION_DISTANCE_PER_SIZE * size,
-            look_ahead_limit: LOOK_AHEAD_LIMIT_PER_SIZE * size,
+            look_ahead_limit: (LOOK_AHEAD_LIMIT_PER_SIZE * size).min(LONGEST_LOOK_AHEAD),
             look_ahead_pairs: 1000,
             motion_tolerance: MOTION_TOLERANCE_PER_REST_DISTANCE * REST_DISTANCE_PER_SIZE * size,
             max_constraints: 1024,
