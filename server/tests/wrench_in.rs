@@ -87,26 +87,45 @@ async fn until(what: &str, mut holds: impl FnMut() -> bool) {
     }
 }
 
-/// What the hand felt, tick by tick: session time, s, and wrench along x, N; from the recording.
-pub(crate) fn felt(folder: &Path) -> Vec<(f64, f64)> {
+/// What the hand felt at a tick, from the recording.
+pub(crate) struct Felt {
+    /// Session time of the sample, s.
+    time: f64,
+    /// Along x, N.
+    pub force: f64,
+    /// What the port's damping may be of that, N: 20 N s/m times the speed from the sample before to this one (docs/safety.md, "Passivity").
+    damping: f64,
+}
+
+pub(crate) fn felt(folder: &Path) -> Vec<Felt> {
     let text = std::fs::read_to_string(folder.join("session/haptics.csv"));
     let text = text.unwrap_or_else(|error| panic!("{error}"));
     let mut lines = text.lines();
     let head: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let column = |name: &str| {
+    let columns = ["t_ns", "fx", "x", "y", "z"].map(|name| {
         let at = head.iter().position(|one| *one == name);
         at.unwrap_or_else(|| panic!("{name} in {head:?}"))
-    };
-    let (time, force) = (column("t_ns"), column("fx"));
-    let number = |row: &[&str], at: usize| -> f64 {
-        row[at]
-            .parse()
-            .unwrap_or_else(|error| panic!("{error}: {row:?}"))
-    };
+    });
+    let (mut last, mut damping) = (None::<(f64, [f64; 3])>, 0.0);
     lines
         .map(|line| {
             let row: Vec<&str> = line.split(',').collect();
-            (number(&row, time) * 1e-9, number(&row, force))
+            let [time, force, x, y, z] = columns.map(|at| {
+                let number = row[at].parse::<f64>();
+                number.unwrap_or_else(|error| panic!("{error}: {row:?}"))
+            });
+            let (time, place) = (time * 1e-9, [x, y, z]);
+            // A tick without a new sample has the damping of the last one.
+            if let Some((before, from)) = last.filter(|(before, _)| *before < time) {
+                let way = place.iter().zip(from).map(|(to, from)| (to - from).powi(2));
+                damping = 20.0 * way.sum::<f64>().sqrt() / (time - before);
+            }
+            last = Some((time, place));
+            Felt {
+                time,
+                force,
+                damping,
+            }
         })
         .collect()
 }
@@ -184,15 +203,18 @@ fn a_sender_gives_one_newton_the_hand_feels_it_and_when_the_sender_dies_it_fades
     let felt = felt(folder.path());
     // The port's own promise, docs/safety.md: 0.5 N/ms since the last write, 1 N at once, and what the hand's slow motion explains.
     for pair in felt.windows(2) {
-        let (time, step) = (pair[1].0 - pair[0].0, (pair[1].1 - pair[0].1).abs());
+        let (time, step) = (
+            pair[1].time - pair[0].time,
+            (pair[1].force - pair[0].force).abs(),
+        );
         assert!(
             step <= 500.0 * time.min(2e-3) + 0.05,
             "{step} N in {time} s"
         );
     }
     // That it was gone in time is what `largest_age_ms` says; a busy machine may have let it fade before, too, so its end alone is looked at here.
-    assert!(felt.iter().any(|(_, force)| *force > 0.99));
-    let left = felt.iter().rev().take(100).map(|(_, force)| force.abs());
+    assert!(felt.iter().any(|one| one.force > 0.99));
+    let left = felt.iter().rev().take(100).map(|one| one.force.abs());
     let left = left.fold(0.0, f64::max);
     assert!(left == 0.0, "{left} N");
 }
@@ -313,9 +335,20 @@ fn old_repeated_overtaken_and_future_values_and_a_flood_give_no_other_force() {
     });
     end(session);
     let felt = felt(folder.path());
-    let least = felt.iter().map(|(_, force)| *force).fold(0.0, f64::min);
-    let most = felt.iter().map(|(_, force)| *force).fold(0.0, f64::max);
-    assert!(least >= -1e-9 && most <= 1.0 + 1e-9, "{least} to {most} N");
+    // A hand that swings back while a starved sender's force fades and comes back is damped, too. It swings at mm/s, so that is 0.1 N at most and hides none of 4 N.
+    for Felt {
+        time,
+        force,
+        damping,
+    } in &felt
+    {
+        let bounds = -damping - 1e-9..=1.0 + damping + 1e-9;
+        assert!(
+            bounds.contains(force),
+            "{force} N at {time} s, of which {damping} N are damping at most"
+        );
+    }
+    let most = felt.iter().map(|one| one.force).fold(0.0, f64::max);
     assert!(most > 0.0, "the good ones were felt");
 }
 

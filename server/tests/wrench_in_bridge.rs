@@ -95,7 +95,7 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
     assert!(failure.is_none());
     let report = bridge.join().expect("no panic").expect("a whole run");
     let felt = felt(folder.path());
-    (felt.into_iter().map(|(_, force)| force).collect(), report)
+    (felt.into_iter().map(|one| one.force).collect(), report)
 }
 
 /// The largest, and that of the last 100 ticks.
