@@ -11,7 +11,7 @@ use super::BridgeError;
 use crate::bridge_loop::BridgeLoop;
 use crate::choice::{DeviceChoice, InputChoice};
 use crate::cli::BridgeArgs;
-use crate::device::{Device, DeviceLimits, Pose};
+use crate::device::{Device, DeviceInfo, Pose};
 use crate::devices::{AtEnd, Grip, MinJerkPath, RecordedDevice, SimulatedDevice, Trace, Tremor};
 use crate::placement::Placement;
 use crate::port::{DevicePort, Passivity, SafetySettings};
@@ -205,16 +205,16 @@ pub(super) fn behind_port(
     if !has_motors {
         safety.passivity.mode = Passivity::Observe; // nobody is given any energy
     } else {
-        for sentence in lowered(&safety, &device.info().limits) {
+        for sentence in lowered(&safety, device.info()) {
             tracing::warn!("{sentence}");
         }
     }
     BridgeLoop::new(DevicePort::new(device, safety, reference_point, start))
 }
 
-/// What to tell a user of limits that are held to what fades in time.
-fn lowered(safety: &SafetySettings, limits: &DeviceLimits) -> Vec<String> {
-    let asked = safety.within(limits);
+/// What to tell a user of limits that are held to what fades in time: nothing of a torque that the device has no motors for.
+fn lowered(safety: &SafetySettings, info: &DeviceInfo) -> Vec<String> {
+    let asked = safety.within(&info.limits);
     let held = asked.that_can_fade();
     let rate_hz = safety.period.as_secs_f64().recip();
     [
@@ -228,6 +228,7 @@ fn lowered(safety: &SafetySettings, limits: &DeviceLimits) -> Vec<String> {
         ),
     ]
     .into_iter()
+    .take(if info.renders_no_torque().is_some() { 1 } else { 2 })
     .filter(|((_, asked, held, _), _)| held < asked)
     .map(|((limit, asked, held, unit), (slew, rate))| {
         format!(
@@ -243,24 +244,40 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+    use crate::device::DeviceLimits;
 
     #[test]
     fn a_limit_that_is_lowered_to_what_fades_in_time_is_told() {
-        let said = |max_force, rate_hz: f64, limits| {
+        let said_of = |max_force, rate_hz: f64, limits, actuated_degrees_of_freedom| {
             let safety = SafetySettings {
                 max_force,
                 period: Duration::from_secs_f64(rate_hz.recip()),
                 ..SafetySettings::default()
             };
-            lowered(&safety, &limits).join("; ")
+            let info = DeviceInfo {
+                actuated_degrees_of_freedom,
+                limits,
+                ..DeviceInfo::without_force("arm")
+            };
+            lowered(&safety, &info).join("; ")
         };
+        let said = |max_force, rate_hz, limits| said_of(max_force, rate_hz, limits, 6);
         let unlimited = DeviceLimits::UNLIMITED;
         assert_eq!(said(47.5, 1000.0, unlimited), "");
         assert_eq!(
             said(60.0, 1000.0, unlimited),
             "--max-force is lowered from 60 to 47.50 N: at --force-slew 0.5 and --rate 1000 no more fades in time"
         );
-        assert!(said(20.0, 100.0, unlimited).contains("from 20 to 8.00 N"));
+        let slow = said(20.0, 100.0, unlimited);
+        assert!(
+            slow.contains("from 20 to 8.00 N") && slow.contains("--max-torque"),
+            "{slow}"
+        );
+        let without_torque = said_of(20.0, 100.0, unlimited, 3);
+        assert!(
+            without_torque.contains("--max-force") && !without_torque.contains("--max-torque"),
+            "{without_torque}"
+        );
         let weak = DeviceLimits {
             max_force: 5.0,
             ..unlimited

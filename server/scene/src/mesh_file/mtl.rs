@@ -47,13 +47,9 @@ fn parse(text: &str, list: &mut [Material]) -> Vec<Remark> {
         let line = line.trim();
         let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         if key == "newmtl" {
-            let place = |name: &str| {
-                list.iter()
-                    .position(|material| material.name == name.trim())
-            };
-            // A name may hold a `#`, as `usemtl` has it, and a comment may stand behind one.
-            let bare = || rest.split_once(" # ").and_then(|(bare, _)| place(bare));
-            current = place(rest).or_else(bare);
+            // A name may hold a `#`, and a comment may stand behind one: as `usemtl` has it.
+            let name = rest.split(" # ").next().unwrap_or(rest).trim();
+            current = list.iter().position(|material| material.name == name);
             if let Some(place) = current {
                 list[place].is_defined = true;
             }

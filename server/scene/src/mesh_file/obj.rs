@@ -59,7 +59,7 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
                 });
                 material = Some(*place);
             }
-            Some(key @ "mtllib") => materials.libraries.push(named(&line, key).to_owned()),
+            Some("mtllib") => materials.libraries.extend(named_libraries(&line)),
             _ => {}
         }
     }
@@ -79,10 +79,9 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
 /// The libraries of materials that the file names.
 pub(super) fn libraries(bytes: &[u8]) -> Vec<String> {
     let text = String::from_utf8_lossy(without_mark(bytes));
-    let key = "mtllib";
     lines(&text)
-        .filter(|(_, line)| line.split_whitespace().next() == Some(key))
-        .map(|(_, line)| named(&line, key).to_owned())
+        .filter(|(_, line)| line.split_whitespace().next() == Some("mtllib"))
+        .flat_map(|(_, line)| named_libraries(&line))
         .collect()
 }
 
@@ -113,9 +112,26 @@ fn continued(line: &str) -> Option<&str> {
     (!begun.contains('#')).then_some(begun)
 }
 
-/// What follows the key of a line.
+/// The name that follows the key of a line. It may hold blanks and a `#`, as in `Material #25`; a comment has a blank on both sides of it.
 fn named<'l>(line: &'l str, key: &str) -> &'l str {
-    line.trim_start().trim_start_matches(key).trim()
+    let name = line.trim_start().trim_start_matches(key);
+    name.split(" # ").next().unwrap_or(name).trim()
+}
+
+/// The libraries that a `mtllib` line names. Where there are several, all but the last end in `.mtl`: names may hold blanks.
+fn named_libraries(line: &str) -> Vec<String> {
+    const ENDING: &str = ".mtl ";
+    let names = named(line, "mtllib");
+    let ends = names.to_ascii_lowercase();
+    let mut begin = 0;
+    let mut found = Vec::new();
+    for (place, _) in ends.match_indices(ENDING) {
+        let end = place + ENDING.len();
+        found.push(names[begin..end].trim().to_owned());
+        begin = end;
+    }
+    found.push(names[begin..].trim().to_owned());
+    found
 }
 
 /// Texture coordinates of every triangle that [`parse`] gives, in its order. v of the file runs up the picture; here it runs down.
@@ -266,6 +282,26 @@ mod tests {
             parse(b"# square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1e-9\nf 1/1/1 2//2 3 -1\n").unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices[3].z, 1e-9);
+    }
+
+    #[test]
+    fn names_end_where_a_comment_or_the_next_library_begins() {
+        let text = "mtllib a.mtl My Part.MTL b # both\nmtllib my part.mtl\nmtllib \u{130}.mtl c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n\
+                    usemtl steel # bare\nf 1 2 3\nusemtl Material #25\nf 1 3 2\nusemtl steel\nf 1 2 3\n";
+        let libraries = [
+            "a.mtl",
+            "My Part.MTL",
+            "b",
+            "my part.mtl",
+            "\u{130}.mtl",
+            "c.mtl",
+        ];
+        assert_eq!(super::libraries(text.as_bytes()), libraries);
+        let mut materials = Materials::default();
+        assert!(super::parse(text.as_bytes(), &mut materials).is_ok());
+        assert_eq!(materials.libraries, libraries);
+        let names: Vec<&str> = materials.list.iter().map(|one| one.name.as_str()).collect();
+        assert_eq!(names, ["steel", "Material #25"]);
     }
 
     #[test]

@@ -16,6 +16,7 @@ pub(crate) use absent::MonitorFeed;
 pub(crate) use streaming::MonitorFeed;
 
 use std::fs;
+use std::io::ErrorKind;
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,7 +24,7 @@ use std::sync::Arc;
 use god_object::World;
 use god_object::spatial::Pose;
 use taut_proto::scene::ScreenDescription;
-use taut_recording::{Recorder, RecordingError, Taps};
+use taut_recording::{Recorder, Taps};
 
 use crate::loops::statistics::Statistics;
 use crate::loops::wiring::SharedView;
@@ -62,15 +63,16 @@ impl FreshRecording {
     }
 
     /// Begins a recording that can be computed again. One that cannot be begun may have left files as well, as on a full disk; a directory that had
-    /// something in it is left alone.
+    /// something in it, or that could not be looked into, is left alone.
     pub(crate) fn begin(
         &mut self,
         wanted: &RecordingSettings,
     ) -> Result<(Taps, Recorder), Failure> {
         let directory = &wanted.directory;
-        let is_new = fs::symlink_metadata(directory).is_err();
+        let is_new = matches!(fs::symlink_metadata(directory), Err(error) if error.kind() == ErrorKind::NotFound);
+        let was_empty = fs::read_dir(directory).is_ok_and(|mut files| files.next().is_none());
         let begun = Recorder::start(directory, wanted.manifest.clone(), &wanted.scene);
-        if !matches!(begun, Err(RecordingError::NotEmpty(_))) {
+        if is_new || was_empty {
             let files = fs::read_dir(directory).into_iter().flatten().flatten();
             self.0.extend(files.map(|file| file.path()));
             self.0.extend(is_new.then(|| directory.clone()));
