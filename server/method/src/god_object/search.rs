@@ -47,11 +47,14 @@ impl GodObject {
             return false;
         }
         let surfaces = SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, None);
-        let pairs = self.settings.look_ahead_pairs * answers.len() as u64;
+        let pairs = self
+            .settings
+            .look_ahead_pairs
+            .saturating_mul(answers.len() as u64);
         let pairs = match (purpose.is_felt(), self.was_stopped) {
             (false, _) => pairs / SEARCH_FACTOR,
             (true, false) => pairs,
-            (true, true) => pairs * SEARCH_FACTOR,
+            (true, true) => pairs.saturating_mul(SEARCH_FACTOR),
         };
         let mut any = false;
         for index in 0..at.places.len() {

@@ -220,7 +220,6 @@ impl GodObject {
             made: 0.0,
             branch: angular(&unconstrained),
             step_memory: StepMemory::default(),
-            reversals: 0,
         };
         report.unfinished = true;
         while report.substeps < self.settings.max_substeps {

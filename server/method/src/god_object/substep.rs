@@ -16,22 +16,17 @@ use crate::spatial::{
 const TRUSTED_SHARE: f64 = 0.5;
 /// A motion that is a smaller share of the way that the update has made is left to the next update.
 const LEAST_STEP_SHARE: f64 = 0.1;
-/// A body with less than this share of the rest distance left is eased out in the same update, however little that is.
+/// A body with less than this share of the rest distance left is eased out in the same update, however little that is: left to the next, the force on a rough
+/// peg in a hole of 5 um is off by half.
 const TIGHT_GAP_SHARE: f64 = 0.5;
-/// Motions that turn back on each other more often than this go to and fro about where they end: the next update is nearer.
-const MAX_REVERSALS: u32 = 2;
 /// Most by which motions become shorter when one turns back on the last.
 const LARGEST_DAMPING: f64 = 16.0;
 /// A sub-step that loses more than this share of the rest distance to what is nearest shows the same.
 const LOST_GAP_SHARE: f64 = 0.5;
-/// One that loses less than this was as the rows predicted.
-const HELD_GAP_SHARE: f64 = 0.1;
 /// Most shares of its way that a sub-step asks for, until rounds come to rest; what the last one gives is cut.
 const MAX_SHARES: u32 = 8;
-/// How much farther the rows are trusted after a motion that was free; after one that was as predicted, so that what one stop took is regained in
-/// two sub-steps and not in six.
-const SLOW_GROWTH: f64 = 2.0;
-const FAST_GROWTH: f64 = 8.0;
+/// How much farther the rows are trusted after a motion that was free: what one stop took is regained in two sub-steps and not in six.
+const GROWTH: f64 = 8.0;
 
 /// What the sub-steps of one update hand on.
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +47,6 @@ pub(super) struct Update {
     pub(super) branch: Vector3<f64>,
     /// Last motion and damping.
     pub(super) step_memory: StepMemory,
-    /// How often a motion has turned back on the last.
-    pub(super) reversals: u32,
 }
 
 /// What one motion says about the next: of the sub-steps of an update, and of whole updates where the hand rests. Motions that turn back on each
@@ -106,15 +99,11 @@ impl GodObject {
         if follows {
             update.step_memory = StepMemory::default();
         }
-        if update
+        update
             .step_memory
-            .relax(&projected.acceleration, self.radius)
-        {
-            update.reversals += 1;
-        }
-        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
-        // but for easing out, which is little always: a body left far below the rest distance stops at every motion. Nor is a motion
-        // little that was cut to what is trusted, or that begins a fall.
+            .relax(&projected.acceleration, self.radius);
+        // What is little beside the way made so far is left to the next update; but for easing out, which is little always: a body left far below
+        // the rest distance stops at every motion. Nor is a motion little that was cut to what is trusted, or that begins a fall.
         let tight = self.set.gap_min < TIGHT_GAP_SHARE * self.settings.rest_distance;
         let little = if tight || cut {
             0.0
@@ -123,9 +112,7 @@ impl GodObject {
         };
         // What sticks creeps by as much as friction's answer is in error: that is no motion.
         let (moving, error) = self.motion_with_friction(&projected.acceleration);
-        let settling = update.reversals > MAX_REVERSALS && !tight && !cut;
-        let long_enough = !settling
-            && moving > self.settings.motion_tolerance.max(error)
+        let long_enough = moving > self.settings.motion_tolerance.max(error)
             && (covered * update.step_memory.damping > little // false for NaN
                 || self.tips_over(&projected.acceleration, left, report));
         if !long_enough {
@@ -163,12 +150,7 @@ impl GodObject {
         } else if !true_rows {
             self.trust_length = (TRUSTED_SHARE * covered).max(self.settings.motion_tolerance);
         } else if time >= 1.0 {
-            let as_predicted = lost <= HELD_GAP_SHARE * self.settings.rest_distance; // false for NaN
-            self.trust_length *= if as_predicted {
-                FAST_GROWTH
-            } else {
-                SLOW_GROWTH
-            };
+            self.trust_length *= GROWTH;
         }
         if time < TRUSTED_SHARE || !true_rows {
             // What comes next is a way out, and no turning back.
@@ -268,15 +250,13 @@ impl StepMemory {
         self.damping
     }
 
-    /// Takes note of a projected motion, before it is made: one that turns back on the last, for which this is true, says that the last went
-    /// too far.
-    pub(super) fn relax(&mut self, motion: &Vector6, radius: f64) -> bool {
+    /// Takes note of a projected motion, before it is made: one that turns back on the last says that the last went too far.
+    pub(super) fn relax(&mut self, motion: &Vector6, radius: f64) {
         let weighed = |a: &Vector6, b: &Vector6| {
             linear(a).dot(&linear(b)) + radius * radius * angular(a).dot(&angular(b))
         };
         let along = weighed(motion, &self.last_motion);
-        let turns_back = along < 0.0;
-        if turns_back {
+        if along < 0.0 {
             // Aitken's extrapolation: motions in proportion to the way that is left would end here.
             let ratio = along / weighed(&self.last_motion, &self.last_motion);
             self.damping /= (1.0 - ratio).min(LARGEST_DAMPING);
@@ -284,7 +264,6 @@ impl StepMemory {
             self.grow();
         }
         self.last_motion = *motion;
-        turns_back
     }
 
     /// The next motion makes twice the share, and not at once all: a peg at the mouth of its hole would go to and fro, and stay there.

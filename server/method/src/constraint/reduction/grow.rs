@@ -5,10 +5,7 @@ use arrayvec::ArrayVec;
 use super::at::{At, Purpose, Surfaces};
 use super::neighbours::{Arrival, Sides, for_neighbours};
 use super::row::{Known, face};
-use super::{
-    MAX_ROUNDS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES,
-    WITNESS_REST_DISTANCES,
-};
+use super::{MAX_ROUNDS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES};
 use crate::collision::{Placement, Work};
 use crate::constraint::collect::{for_contacts, in_world};
 use crate::constraint::facing::Facing;
@@ -210,7 +207,7 @@ impl RowReduction {
             obstacle,
             placement: &placement,
             obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
-            activation_distance: WITNESS_REST_DISTANCES * at.rest_distance,
+            activation_distance: NEAR_REST_DISTANCES * at.rest_distance,
             past_reentrant_edges: false,
         };
         // The features that touch may be other triangles' to look at.

@@ -59,8 +59,6 @@ const FEW: usize = 64;
 const MAX_ROUNDS: u32 = 24;
 /// Most candidates that turn out to face no more, in one round.
 const MAX_STALE: u32 = 64;
-/// How near a pair of the triangles that stopped the body must be to become a row.
-const WITNESS_REST_DISTANCES: f64 = 4.0;
 /// Most pairs that have slid off their features which are followed, in one motion.
 const MAX_FOLLOWED: usize = 16;
 /// Updates that a row outlives its last use: rows do not come and go with every tremor.
@@ -70,7 +68,7 @@ const IDLE_UPDATES_IMPLIED: u32 = 1;
 
 /// Pairs up to this many rest distances apart touch.
 const TOUCHING_REST_DISTANCES: f64 = 2.0;
-/// A row of a gap up to so many rest distances holds the body, or will soon.
+/// A row of a gap up to so many rest distances holds the body, or will soon; and what stopped the body is a row where it is as near.
 const NEAR_REST_DISTANCES: f64 = 4.0;
 
 /// Finds rows as motions need them.
