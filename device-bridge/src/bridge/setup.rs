@@ -248,11 +248,10 @@ mod tests {
 
     #[test]
     fn a_limit_that_is_lowered_to_what_fades_in_time_is_told() {
-        let said_of = |max_force, rate_hz: f64, limits, actuated_degrees_of_freedom| {
+        let told = |safety: SafetySettings, rate_hz: f64, limits, actuated_degrees_of_freedom| {
             let safety = SafetySettings {
-                max_force,
                 period: Duration::from_secs_f64(rate_hz.recip()),
-                ..SafetySettings::default()
+                ..safety
             };
             let info = DeviceInfo {
                 actuated_degrees_of_freedom,
@@ -261,23 +260,32 @@ mod tests {
             };
             lowered(&safety, &info).join("; ")
         };
-        let said = |max_force, rate_hz, limits| said_of(max_force, rate_hz, limits, 6);
+        let said = |max_force, rate_hz, limits| {
+            let safety = SafetySettings {
+                max_force,
+                ..SafetySettings::default()
+            };
+            told(safety, rate_hz, limits, 6)
+        };
         let unlimited = DeviceLimits::UNLIMITED;
         assert_eq!(said(47.5, 1000.0, unlimited), "");
         assert_eq!(
             said(60.0, 1000.0, unlimited),
             "--max-force is lowered from 60 to 47.50 N: at --force-slew 0.5 and --rate 1000 no more fades in time"
         );
-        let slow = said(20.0, 100.0, unlimited);
-        assert!(
-            slow.contains("from 20 to 8.00 N") && slow.contains("--max-torque"),
-            "{slow}"
-        );
-        let without_torque = said_of(20.0, 100.0, unlimited, 3);
-        assert!(
-            without_torque.contains("--max-force") && !without_torque.contains("--max-torque"),
-            "{without_torque}"
-        );
+        assert!(said(20.0, 100.0, unlimited).contains("from 20 to 8.00 N"));
+        for (motors, told_of_torque) in [(6, true), (3, false)] {
+            let safety = SafetySettings {
+                max_torque: 50.0,
+                ..SafetySettings::default()
+            };
+            let told = told(safety, 1000.0, unlimited, motors);
+            assert_eq!(
+                told.contains("--max-torque is lowered"),
+                told_of_torque,
+                "{told}"
+            );
+        }
         let weak = DeviceLimits {
             max_force: 5.0,
             ..unlimited
