@@ -93,7 +93,7 @@ pub(crate) struct Felt {
     time: f64,
     /// Along x, N.
     pub force: f64,
-    /// What the port's damping may be of that, N: 20 N s/m times the speed from the sample before to this one (docs/safety.md, "Passivity").
+    /// The most damping that the port may add to it, N: -20 N s/m times the velocity from the sample before to this one (docs/safety.md, "Passivity").
     damping: f64,
 }
 
@@ -102,25 +102,24 @@ pub(crate) fn felt(folder: &Path) -> Vec<Felt> {
     let text = text.unwrap_or_else(|error| panic!("{error}"));
     let mut lines = text.lines();
     let head: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let columns = ["t_ns", "fx", "x", "y", "z"].map(|name| {
+    let columns = ["t_ns", "fx", "x"].map(|name| {
         let at = head.iter().position(|one| *one == name);
         at.unwrap_or_else(|| panic!("{name} in {head:?}"))
     });
-    let (mut last, mut damping) = (None::<(f64, [f64; 3])>, 0.0);
+    let (mut last, mut damping) = (None::<(f64, f64)>, 0.0);
     lines
         .map(|line| {
             let row: Vec<&str> = line.split(',').collect();
-            let [time, force, x, y, z] = columns.map(|at| {
+            let [time, force, x] = columns.map(|at| {
                 let number = row[at].parse::<f64>();
                 number.unwrap_or_else(|error| panic!("{error}: {row:?}"))
             });
-            let (time, place) = (time * 1e-9, [x, y, z]);
+            let time = time * 1e-9;
             // A tick without a new sample has the damping of the last one.
             if let Some((before, from)) = last.filter(|(before, _)| *before < time) {
-                let way = place.iter().zip(from).map(|(to, from)| (to - from).powi(2));
-                damping = 20.0 * way.sum::<f64>().sqrt() / (time - before);
+                damping = -20.0 * (x - from) / (time - before);
             }
-            last = Some((time, place));
+            last = Some((time, x));
             Felt {
                 time,
                 force,
@@ -335,14 +334,15 @@ fn old_repeated_overtaken_and_future_values_and_a_flood_give_no_other_force() {
     });
     end(session);
     let felt = felt(folder.path());
-    // A hand that swings back while a starved sender's force fades and comes back is damped, too. It swings at mm/s, so that is 0.1 N at most and hides none of 4 N.
+    // A hand that swings back while a starved sender's force fades and comes back is damped, too. Damping is against the motion: a push that should not
+    // be there has none to hide in.
     for Felt {
         time,
         force,
         damping,
     } in &felt
     {
-        let bounds = -damping - 1e-9..=1.0 + damping + 1e-9;
+        let bounds = damping.min(0.0) - 1e-9..=1.0 + damping.max(0.0) + 1e-9;
         assert!(
             bounds.contains(force),
             "{force} N at {time} s, of which {damping} N are damping at most"

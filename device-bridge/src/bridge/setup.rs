@@ -212,9 +212,9 @@ pub(super) fn behind_port(
     BridgeLoop::new(DevicePort::new(device, safety, reference_point, start))
 }
 
-/// What to tell a user of limits that are held to what fades in time: nothing of a torque that the device has no motors for.
+/// What to tell a user of limits that are held to what fades in time.
 fn lowered(safety: &SafetySettings, info: &DeviceInfo) -> Vec<String> {
-    let asked = safety.within(&info.limits);
+    let asked = safety.within(info);
     let held = asked.that_can_fade();
     let rate_hz = safety.period.as_secs_f64().recip();
     [
@@ -228,7 +228,6 @@ fn lowered(safety: &SafetySettings, info: &DeviceInfo) -> Vec<String> {
         ),
     ]
     .into_iter()
-    .take(if info.renders_no_torque().is_some() { 1 } else { 2 })
     .filter(|((_, asked, held, _), _)| held < asked)
     .map(|((limit, asked, held, unit), (slew, rate))| {
         format!(

@@ -102,9 +102,6 @@ impl DevicePort {
     ) -> Self {
         let info = device.info();
         let mut settings = settings.for_device(device.as_ref());
-        if info.actuated_degrees_of_freedom == 3 {
-            settings.max_torque = 0.0; // it has no motors for one
-        }
         if info.actuated_degrees_of_freedom == 0 {
             // A trace may stop dead: nobody feels it.
             settings.validation.frozen_after = Duration::ZERO;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::passivity::PassivitySettings;
 use super::validation::ValidationSettings;
-use crate::device::{Device, DeviceLimits};
+use crate::device::{Device, DeviceInfo};
 
 /// Limits and times of a [`DevicePort`](super::DevicePort).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,11 +101,15 @@ impl SafetySettings {
             .saturating_sub(period)
     }
 
-    /// The same with limits that are not above those of the device.
+    /// The same with limits that are not above those of the device: no torque where it has no motors for one.
     #[must_use]
-    pub fn within(mut self, limits: &DeviceLimits) -> Self {
+    pub fn within(mut self, info: &DeviceInfo) -> Self {
+        let limits = &info.limits;
         self.max_force = self.max_force.min(limits.max_force);
-        self.max_torque = self.max_torque.min(limits.max_torque);
+        self.max_torque = match info.actuated_degrees_of_freedom {
+            3 => 0.0,
+            _ => self.max_torque.min(limits.max_torque),
+        };
         self.contact.stiffness = self.contact.stiffness.min(limits.max_stiffness);
         self
     }
@@ -113,7 +117,7 @@ impl SafetySettings {
     /// The same for a port of this device: within its limits, that can fade, and with what is said of the hand's speed, which is one at the device, in the
     /// scene's metres, in which the port sees it.
     pub(super) fn for_device(self, device: &dyn Device) -> Self {
-        let mut settings = self.within(&device.info().limits).that_can_fade();
+        let mut settings = self.within(device.info()).that_can_fade();
         let scale = device.scale();
         settings.validation.max_speed *= scale;
         settings.validation.frozen_speed *= scale;
@@ -181,7 +185,7 @@ mod tests {
     use nalgebra::{Point3, Vector6};
 
     use super::*;
-    use crate::device::{DeviceFault, DeviceInfo, DeviceSample, Pose};
+    use crate::device::{DeviceFault, DeviceLimits, DeviceSample, Pose};
     use crate::port::{Command, DevicePort, Passivity};
 
     /// A hand of `speed` m/s along x, at a device whose metre is `scale` of the scene.

@@ -11,6 +11,7 @@
 use std::path::Path;
 
 use super::material::Material;
+use super::obj;
 use super::read::without_mark;
 use crate::appearance::{Appearance, linear};
 use crate::files::read_bytes;
@@ -47,8 +48,7 @@ fn parse(text: &str, list: &mut [Material]) -> Vec<Remark> {
         let line = line.trim();
         let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         if key == "newmtl" {
-            // A name may hold a `#`, and a comment may stand behind one: as `usemtl` has it.
-            let name = rest.split(" # ").next().unwrap_or(rest).trim();
+            let name = obj::name(rest);
             current = list.iter().position(|material| material.name == name);
             if let Some(place) = current {
                 list[place].is_defined = true;

@@ -112,10 +112,14 @@ fn continued(line: &str) -> Option<&str> {
     (!begun.contains('#')).then_some(begun)
 }
 
-/// The name that follows the key of a line. It may hold blanks and a `#`, as in `Material #25`; a comment has a blank on both sides of it.
+/// The name that follows the key of a line.
 fn named<'l>(line: &'l str, key: &str) -> &'l str {
-    let name = line.trim_start().trim_start_matches(key);
-    name.split(" # ").next().unwrap_or(name).trim()
+    name(line.trim_start().trim_start_matches(key))
+}
+
+/// A name without the comment behind it. It may hold blanks and a `#`, as in `Material #25`; a comment's `#` has a blank on either side.
+pub(super) fn name(text: &str) -> &str {
+    text.split(" # ").next().unwrap_or(text).trim()
 }
 
 /// The libraries that a `mtllib` line names. Where there are several, all but the last end in `.mtl`: names may hold blanks.
