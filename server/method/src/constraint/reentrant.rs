@@ -17,10 +17,8 @@ use crate::geometry::Mesh;
 
 /// Most faces at a vertex that are looked at: beyond, it is no notch.
 const MAX_FACES: usize = 32;
-/// Most faces between the end of a face and the place under which it goes on.
-const MAX_STEPS: usize = 4;
-/// The same for a ball, which goes over many facets of a fine hollow from one update to the next.
-const MAX_BALL_STEPS: usize = 64;
+/// Most faces between the end of a face and the place under which it goes on: what slides in a fine hollow goes over many from one update to the next.
+const MAX_STEPS: usize = 64;
 /// A face seen at a flatter angle than that of this sine does not lie over anything.
 const GRAZING: f64 = 0.05;
 /// Share of a way by which it may rise out of a surface that it lies in.
@@ -142,7 +140,7 @@ pub(super) fn covers_foot(
     place: impl Fn(u32) -> [Point3<f64>; 3],
     point: &Point3<f64>,
 ) -> bool {
-    way_to_foot(mesh, t, MAX_STEPS, place, point).is_some()
+    foot_from(mesh, t, place, point).is_some_and(|foot| foot.face != t)
 }
 
 /// The same for a ball about a point, of the faces of one flat region for one alone: that which borders on the next region.
@@ -150,21 +148,33 @@ pub(super) fn covers_foot(
 /// A point that lies past a reentrant side of the angle a, h above the face behind it, is h / cos(a) or more above the plane of the face before: a ball that
 /// is clear of the face that it is over is clear of the plane of `t`, too.
 pub(crate) fn covers_ball(mesh: &Mesh, t: u32, middle: &Point3<f64>) -> bool {
-    let first = way_to_foot(mesh, t, MAX_BALL_STEPS, |t| mesh.corners(t), middle);
+    let foot = foot_from(mesh, t, |t| mesh.corners(t), middle);
+    let first = foot.and_then(|foot| foot.first);
     first.is_some_and(|edge| !mesh.edges()[edge as usize].flat)
 }
 
-/// The side of triangle `t` across which a way of so many steps begins over sides that do not stand out, to the face that the point is over.
-fn way_to_foot(
+/// The face that a point is over, at the end of a way over sides that do not stand out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Foot {
+    pub(super) face: u32,
+    /// The first side that was crossed; `None` where the way began over its end.
+    first: Option<u32>,
+}
+
+/// The face that a point is over, from triangle `t` on; `None` where a side that stands out is in the way, or the way has no end. Corners by `place`, in
+/// one frame with the point.
+pub(super) fn foot_from(
     mesh: &Mesh,
     t: u32,
-    steps: usize,
     place: impl Fn(u32) -> [Point3<f64>; 3],
     point: &Point3<f64>,
-) -> Option<u32> {
-    let (mut face, mut first) = (t, None);
-    for _ in 0..=steps {
-        let corners = place(face);
+) -> Option<Foot> {
+    let mut foot = Foot {
+        face: t,
+        first: None,
+    };
+    for _ in 0..=MAX_STEPS {
+        let corners = place(foot.face);
         let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
         let beyond = (0..3).find(|k| {
             let side = corners[(k + 1) % 3] - corners[*k];
@@ -172,16 +182,16 @@ fn way_to_foot(
             !inside
         });
         let Some(side) = beyond else {
-            return first;
+            return Some(foot);
         };
-        let e = mesh.triangle_edges(face)[side];
+        let e = mesh.triangle_edges(foot.face)[side];
         let edge = &mesh.edges()[e as usize];
         if edge.is_convex() {
             return None;
         }
-        first.get_or_insert(e);
+        foot.first.get_or_insert(e);
         let [left, right] = edge.faces;
-        face = if left == face { right } else { left };
+        foot.face = if left == foot.face { right } else { left };
     }
     None
 }

@@ -21,7 +21,7 @@ const LONGER_WAY: f64 = 0.5;
 /// Share of the motion tolerance by which a row that was left out may be violated. By the whole of it, rows a millimetre apart would let a
 /// body be turned by tens of microradians, and a torque about the axis of a hole of millionths of the force be felt; a row more costs a microsecond.
 const ROW_TOLERANCE_SHARE: f64 = 1e-3;
-/// Motions of a published set whose answers are searched along: where the device is, and where it goes on to.
+/// Motions of a published set whose answers are searched along and turn: where the device is, and where it goes on to.
 const SEARCHED_MOTIONS: usize = 2;
 /// Most rows that are added one by one where friction or a moving obstacle leads.
 const MAX_ADDED: u32 = 24;
@@ -108,9 +108,13 @@ impl GodObject {
             reduction.take_all((at, &surfaces)) && !reduction.was_given_up()
         });
         let probes = self.probes(difference, reach);
-        if all != Some(true) {
-            self.complete_for_force(&probes, work);
-        }
+        // Where every pair is a row, those remain that they turn into.
+        let asked = if all == Some(true) {
+            SEARCHED_MOTIONS
+        } else {
+            MAX_MOTIONS
+        };
+        self.complete_for_force(&probes[..asked], work);
         let met = self.with_reduction(|this, reduction, at| {
             let continued = |way: &Vector6| this.continued(way, reach);
             reduction.meet_corners((at, &this.surfaces(None)), &probes[1], continued, work)
@@ -201,11 +205,13 @@ impl GodObject {
         work: &mut Work,
     ) -> ArrayVec<Vector6, MAX_MOTIONS> {
         let surfaces = self.surfaces(None);
-        let mut answer = |motion| {
+        let mut answer = |(k, motion)| {
             let of = (at, &surfaces as &dyn Surfaces);
-            reduction.complete(of, motion, purpose, work).acceleration
+            let turns = k < SEARCHED_MOTIONS;
+            let projection = reduction.complete(of, motion, (purpose, turns), work);
+            projection.acceleration
         };
-        motions.iter().map(&mut answer).collect()
+        motions.iter().enumerate().map(&mut answer).collect()
     }
 
     /// Eq. (1) with the rows that its answer needs: friction, and what must be out of the way, lead elsewhere than the wish alone.

@@ -46,7 +46,7 @@ impl RowReduction {
         {
             return false;
         }
-        let held = self.complete(of, &continued(motion), Purpose::Force, work);
+        let held = self.complete(of, &continued(motion), (Purpose::Force, false), work);
         let mut holding = held
             .active
             .iter()
@@ -56,7 +56,9 @@ impl RowReduction {
         }
         self.set_corners_aside();
         // What holds the body elsewhere leads it past some of them.
-        let answer = self.complete(of, motion, Purpose::Force, work).acceleration;
+        let answer = self
+            .complete(of, motion, (Purpose::Force, false), work)
+            .acceleration;
         self.bring_corners_back(of, &continued(&answer))
     }
 

@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::at::{At, Purpose, Surfaces};
-use super::neighbours::{Arrival, Sides, for_neighbours};
+use super::neighbours::{Arrival, for_neighbours};
 use super::row::{Known, face};
 use super::{MAX_ROUNDS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES};
 use crate::collision::{Placement, Work};
@@ -15,12 +15,13 @@ use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection};
 use crate::spatial::Vector6;
 
 impl RowReduction {
-    /// Adds rows until the projection of `unconstrained` violates none by more than the tolerance; the projection.
+    /// Adds rows until the projection of `unconstrained` violates none by more than the tolerance, nor, where it `turns`, any of what the rows turn into; the
+    /// projection.
     pub(crate) fn complete(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
         unconstrained: &Vector6,
-        purpose: Purpose,
+        (purpose, turns): (Purpose, bool),
         work: &mut Work,
     ) -> Projection {
         let least_gap = purpose.least_gap(at);
@@ -60,10 +61,10 @@ impl RowReduction {
             let violation = self.add_most_violated((at, surfaces), answer, purpose, work);
             let finished = violation <= at.tolerance || rounds == MAX_ROUNDS; // false for NaN
             if finished || !violation.is_finite() {
-                let turns_a_corner = purpose == Purpose::Motion
+                if turns
                     && rounds < MAX_ROUNDS
-                    && self.add_neighbours((at, surfaces), answer, work);
-                if turns_a_corner {
+                    && self.add_turned((at, surfaces), answer, purpose, work)
+                {
                     continue;
                 }
                 let is_known = violation.is_finite() && projection.kkt_residual <= KKT_TOLERANCE;
@@ -74,39 +75,40 @@ impl RowReduction {
         }
     }
 
-    /// Adds the pairs that those of rows which touch turn into, where the motion violates them by more than the tolerance; whether there are any. Also of
-    /// rows that the motion leaves: what lies in a groove leaves one of its sides for the other.
-    fn add_neighbours(
+    /// Adds the pairs that those of rows turn into which hold the body, where the motion violates them by more than the tolerance; whether there are any. For a
+    /// motion also of rows that touch, and that it leaves: what lies in a groove leaves one of its sides for the other.
+    fn add_turned(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
         motion: &Vector6,
+        purpose: Purpose,
         work: &mut Work,
     ) -> bool {
         let before = self.now;
+        let least_gap = purpose.least_gap(at);
+        let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
         for k in 0..self.known.len() {
             let Contact {
                 features: pair,
                 gap,
                 ..
             } = self.known[k].contact;
-            if gap > TOUCHING_REST_DISTANCES * at.rest_distance {
+            let held = self.warm_start.contains(&(k as u32));
+            let near = purpose == Purpose::Motion && gap <= touching;
+            if !held && !near {
                 continue;
             }
-            let obstacle = &at.world.obstacles[usize::from(pair.obstacle)].mesh;
-            let body = &at.world.body.mesh;
-            let arrival = Arrival::of(at, &pair, motion);
-            for_neighbours(body, obstacle, &pair, Sides::Reentrant, |features| {
-                let clear = arrival
-                    .over(body, obstacle, &features)
-                    .is_some_and(|clearance| clearance >= at.rest_distance - at.tolerance);
-                if clear || self.knows(&features) {
+            let mut consider = |features: FeaturePair| {
+                if self.knows(&features) {
                     return;
                 }
                 let Some(contact) = face(at, &features, true, work) else {
                     return;
                 };
                 let row = Known::of(&contact, surfaces, &at.center());
-                let violation = at.rest_distance - contact.gap - row.jacobian.dot(motion);
+                let (jacobian, nearer) = row.for_purpose(purpose);
+                let gap = contact.gap.max(least_gap) - nearer;
+                let violation = at.rest_distance - gap - jacobian.dot(motion);
                 if violation > at.tolerance {
                     // It does not face yet.
                     self.add(Known {
@@ -114,7 +116,15 @@ impl RowReduction {
                         ..row
                     });
                 }
-            });
+            };
+            match Arrival::of(at, &pair, motion) {
+                Arrival::Over(features) => consider(features),
+                Arrival::Off => {}
+                Arrival::OfNoVertex => {
+                    let obstacle = &at.world.obstacles[usize::from(pair.obstacle)].mesh;
+                    for_neighbours(&at.world.body.mesh, obstacle, &pair, consider);
+                }
+            }
         }
         self.now > before
     }
@@ -129,7 +139,7 @@ impl RowReduction {
         let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let body = &at.world.body.mesh;
-        for_neighbours(body, &obstacle.mesh, pair, Sides::All, |features| {
+        for_neighbours(body, &obstacle.mesh, pair, |features| {
             if self.knows(&features) {
                 return;
             }

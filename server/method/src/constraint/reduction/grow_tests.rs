@@ -128,7 +128,7 @@ fn a_row_behind_many_candidates_that_face_no_more_is_found() {
     let here = block_on_block(0.0);
     reduction.move_to((&here, &Plain), None, work);
     let wish = Vector6::new(0.0, 0.0, -5.0 * GAP, 0.0, 0.0, 0.0);
-    let answer = reduction.complete((&here, &Plain), &wish, Purpose::Motion, work);
+    let answer = reduction.complete((&here, &Plain), &wish, (Purpose::Motion, true), work);
     let down = -answer.acceleration[2];
     assert!((down - (GAP - REST)).abs() < 1e-8, "{down}");
     assert!(reduction.error() <= here.tolerance, "{}", reduction.error());

@@ -1,13 +1,14 @@
-//! Pairs that a row's pair turns into where it slides off its feature past a reentrant edge.
+//! Pairs that a row's pair turns into where it slides off its feature.
 //!
 //! In the corner of two walls the rows of both hold, but only the one under the foot faces. A motion that crosses the corner would
-//! find the other wall by running into it, and the next would run back into the first: to and fro, because no projection knew both.
+//! find the other wall by running into it, and the next would run back into the first: to and fro, because no projection knew both. So it is for a force:
+//! in a hollow of facets the normal turns as the body slides, and a set without the facets beside would turn it an update late.
 
 use arrayvec::ArrayVec;
 use nalgebra::Point3;
 
 use super::At;
-use crate::constraint::reentrant::for_faces;
+use crate::constraint::reentrant::{Foot, foot_from, for_faces};
 use crate::constraint::{Feature, FeaturePair};
 use crate::geometry::Mesh;
 use crate::spatial::{Vector6, angular, linear};
@@ -17,49 +18,46 @@ const MAX_NEIGHBOURS: usize = 9;
 /// An edge goes on in another one that turns by less than the angle of this cosine.
 const GOES_ON: f64 = 0.5;
 
-/// Which sides of a face lead to a neighbour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sides {
-    /// Those that do not stand out: across them the row of the neighbour is implied before it faces.
-    Reentrant,
-    All,
-}
-
-/// Where a vertex of a pair of vertex and face arrives by a motion of the body, to first order, in the frame of the face's mesh.
+/// Where a motion of the body brings the vertex of a pair of vertex and face, to first order.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Arrival {
-    AtObstacle(Point3<f64>),
-    AtBody(Point3<f64>),
     /// The pair is none of vertex and face.
-    Unknown,
+    OfNoVertex,
+    /// Past a side of its face that stands out.
+    Off,
+    /// Over the face of this pair, the same or one that it turned into.
+    Over(FeaturePair),
 }
 
 impl Arrival {
     pub(super) fn of(at: &At, pair: &FeaturePair, motion: &Vector6) -> Self {
         let (mesh, pose) = at.obstacle(usize::from(pair.obstacle));
+        let body = &at.world.body.mesh;
         let way = |p: &Point3<f64>| linear(motion) + angular(motion).cross(&(p - at.center()));
         match (pair.on_body, pair.on_obstacle) {
-            (Feature::Vertex(v), Feature::Face(_)) => {
-                let x = at.pose * at.world.body.mesh.vertices()[v as usize];
-                Self::AtObstacle(pose.inverse_transform_point(&(x + way(&x))))
+            (Feature::Vertex(v), Feature::Face(t)) => {
+                let x = at.pose * body.vertices()[v as usize];
+                let arrived = pose.inverse_transform_point(&(x + way(&x)));
+                Self::over(mesh, t, &arrived, |face| FeaturePair {
+                    on_obstacle: Feature::Face(face),
+                    ..*pair
+                })
             }
-            (Feature::Face(_), Feature::Vertex(w)) => {
+            (Feature::Face(t), Feature::Vertex(w)) => {
                 let y = pose * mesh.vertices()[w as usize];
-                Self::AtBody(at.pose.inverse_transform_point(&(y - way(&y))))
+                let arrived = at.pose.inverse_transform_point(&(y - way(&y)));
+                Self::over(body, t, &arrived, |face| FeaturePair {
+                    on_body: Feature::Face(face),
+                    ..*pair
+                })
             }
-            _ => Self::Unknown,
+            _ => Self::OfNoVertex,
         }
     }
 
-    /// How far it is then outside the face that a neighbour of the pair has, m.
-    pub(super) fn over(&self, body: &Mesh, obstacle: &Mesh, features: &FeaturePair) -> Option<f64> {
-        let outside = |mesh: &Mesh, face: u32, x: &Point3<f64>| {
-            mesh.face_normal(face).dot(&(x - mesh.corners(face)[0]))
-        };
-        match (self, features.on_body, features.on_obstacle) {
-            (Self::AtObstacle(x), _, Feature::Face(t)) => Some(outside(obstacle, t, x)),
-            (Self::AtBody(y), Feature::Face(t), _) => Some(outside(body, t, y)),
-            _ => None,
-        }
+    fn over(mesh: &Mesh, t: u32, arrived: &Point3<f64>, pair: impl Fn(u32) -> FeaturePair) -> Self {
+        let foot = foot_from(mesh, t, |t| mesh.corners(t), arrived);
+        foot.map_or(Self::Off, |Foot { face, .. }| Self::Over(pair(face)))
     }
 }
 
@@ -68,29 +66,28 @@ pub(super) fn for_neighbours(
     body: &Mesh,
     obstacle: &Mesh,
     pair: &FeaturePair,
-    sides: Sides,
     mut each: impl FnMut(FeaturePair),
 ) {
-    for on_obstacle in neighbours(obstacle, pair.on_obstacle, sides) {
+    for on_obstacle in neighbours(obstacle, pair.on_obstacle) {
         each(FeaturePair {
             on_obstacle,
             ..*pair
         });
     }
-    for on_body in neighbours(body, pair.on_body, sides) {
+    for on_body in neighbours(body, pair.on_body) {
         each(FeaturePair { on_body, ..*pair });
     }
 }
 
 /// Faces across the sides of a face, and theirs; edges in which an edge goes on.
-fn neighbours(mesh: &Mesh, feature: Feature, sides: Sides) -> ArrayVec<Feature, MAX_NEIGHBOURS> {
+fn neighbours(mesh: &Mesh, feature: Feature) -> ArrayVec<Feature, MAX_NEIGHBOURS> {
     let mut found = ArrayVec::new();
     match feature {
         Feature::Face(t) => {
-            across(mesh, t, sides, &mut found);
+            across(mesh, t, &mut found);
             for k in 0..found.len() {
                 if let Feature::Face(s) = found[k] {
-                    across(mesh, s, sides, &mut found);
+                    across(mesh, s, &mut found);
                 }
             }
             found.retain(|face| *face != feature);
@@ -106,13 +103,12 @@ fn neighbours(mesh: &Mesh, feature: Feature, sides: Sides) -> ArrayVec<Feature, 
 }
 
 /// Adds the faces across the sides of a face.
-fn across(mesh: &Mesh, t: u32, sides: Sides, found: &mut ArrayVec<Feature, MAX_NEIGHBOURS>) {
+fn across(mesh: &Mesh, t: u32, found: &mut ArrayVec<Feature, MAX_NEIGHBOURS>) {
     for e in mesh.triangle_edges(t) {
         let edge = &mesh.edges()[e as usize];
         let [left, right] = edge.faces;
         let face = Feature::Face(if left == t { right } else { left });
-        let leads = sides == Sides::All || !edge.is_convex();
-        if leads && !found.contains(&face) && found.try_push(face).is_err() {
+        if !found.contains(&face) && found.try_push(face).is_err() {
             return;
         }
     }
@@ -139,30 +135,35 @@ mod tests {
     use super::*;
     use crate::constraint::reentrant::tests::notched;
 
-    /// The faces at the ridge, left or right of the notch.
-    fn at_ridge(mesh: &Mesh, right: bool) -> Vec<u32> {
-        let of_half = |t: &u32| {
-            let up = mesh.face_normal(*t).z > 0.1;
-            let x: f64 = mesh.corners(*t).iter().map(|p| p.x).sum();
-            up && (x > 0.0) == right
-        };
-        (0..mesh.triangles().len() as u32).filter(of_half).collect()
-    }
-
+    /// A vertex that goes from over one half of a ridge to over the other turns into the face there across a notch, and is off across a peak.
     #[test]
-    fn faces_lead_on_across_a_notch_and_only_of_all_sides_across_a_peak() {
-        for (depth, reentrant) in [(0.1, true), (-0.1, false)] {
+    fn what_crosses_a_notch_turns_into_the_other_side_and_what_crosses_a_peak_is_off() {
+        for (depth, turns) in [(0.1, true), (-0.1, false)] {
             let mesh = notched(depth);
-            let right = at_ridge(&mesh, true);
-            let crosses = |sides| {
-                at_ridge(&mesh, false).iter().any(|t| {
-                    neighbours(&mesh, Feature::Face(*t), sides)
-                        .iter()
-                        .any(|f| right.iter().any(|s| *f == Feature::Face(*s)))
-                })
+            let pair = |face: u32| FeaturePair {
+                obstacle: 0,
+                on_body: Feature::Vertex(0),
+                on_obstacle: Feature::Face(face),
             };
-            assert_eq!(crosses(Sides::Reentrant), reentrant, "{depth}");
-            assert!(crosses(Sides::All), "{depth}");
+            let over = |from: u32, x: f64| {
+                let arrived = Point3::new(x, 0.5, -0.5);
+                Arrival::over(&mesh, from, &arrived, pair)
+            };
+            let on_the_left = |t: &u32| {
+                let x: f64 = mesh.corners(*t).iter().map(|p| p.x).sum();
+                mesh.face_normal(*t).z > 0.1 && x < 0.0
+            };
+            let faces = (0..mesh.triangles().len() as u32).filter(on_the_left);
+            let left = faces.filter(|t| over(*t, -0.4) == Arrival::Over(pair(*t)));
+            let arrivals: Vec<(u32, Arrival)> = left.map(|t| (t, over(t, 0.4))).collect();
+            let turned = |(from, arrival): &(u32, Arrival)| match arrival {
+                Arrival::Over(pair) => pair.on_obstacle != Feature::Face(*from),
+                _ => false,
+            };
+            let off = |(_, arrival): &(u32, Arrival)| *arrival == Arrival::Off;
+            assert!(!arrivals.is_empty(), "{depth}");
+            assert_eq!(arrivals.iter().all(turned), turns, "{depth}: {arrivals:?}");
+            assert_eq!(arrivals.iter().all(off), !turns, "{depth}: {arrivals:?}");
         }
     }
 
@@ -177,7 +178,7 @@ mod tests {
             found.expect("an edge of the ridge") as u32
         };
         let (left, right) = (ridge([2, 5]), ridge([5, 8]));
-        let found = neighbours(&mesh, Feature::Edge(left), Sides::Reentrant);
+        let found = neighbours(&mesh, Feature::Edge(left));
         assert_eq!(found.as_slice(), [Feature::Edge(right)]);
     }
 }
