@@ -16,6 +16,9 @@ const SIZE: f64 = 0.15;
 const APPROACH: usize = 60;
 /// Every so many sets are held against the oracle.
 const ERROR_STRIDE: usize = 5;
+/// Which hands' sets are: where one slides, a wrong set or two of another make a percent of its own. And for what share of the updates each.
+const HANDS: [u64; 4] = [1, 2, 3, 4];
+const ERROR_SHARE: usize = 2;
 
 /// How a hand slides a bunny.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +76,7 @@ impl Slide {
     /// Time of each update in contact, in the unit of `clock`.
     pub fn times(&self, world: &Arc<World>, clock: impl Fn() -> f64) -> Vec<f64> {
         let mut times = Vec::new();
-        self.lead(world, |k, god_object, device| {
+        self.lead(world, 1, self.updates, |k, god_object, device| {
             let before = clock();
             god_object.step(device, None);
             if k >= APPROACH {
@@ -83,27 +86,40 @@ impl Slide {
         times
     }
 
-    /// How far every fifth set is from what all pairs say, for the device one step on; see [`Difference`](super::oracle::Difference).
+    /// How far every fifth set of several hands is from what all pairs say, for the device one step on; see [`Difference`](super::oracle::Difference).
     pub fn errors(&self, world: &Arc<World>) -> Vec<f64> {
         let mut oracle = Oracle::default();
         let mut errors = Vec::new();
-        self.lead(world, |k, god_object, device| {
-            if k > APPROACH && k % ERROR_STRIDE == 0 {
-                errors.push(oracle.compare(world, god_object, device).relative);
-            }
-            god_object.step(device, None);
-        });
+        for hand in HANDS {
+            self.lead(
+                world,
+                hand,
+                self.updates / ERROR_SHARE,
+                |k, god_object, device| {
+                    if k > APPROACH && k % ERROR_STRIDE == 0 {
+                        errors.push(oracle.compare(world, god_object, device).relative);
+                    }
+                    god_object.step(device, None);
+                },
+            );
+        }
         errors
     }
 
-    /// Calls `step` with each pose of the device, which answers to the body.
-    fn lead(&self, world: &Arc<World>, mut step: impl FnMut(usize, &mut GodObject, &Pose)) {
+    /// Calls `step` with each pose of the device in the hand of a seed, which answers to the body.
+    fn lead(
+        &self,
+        world: &Arc<World>,
+        seed: u64,
+        updates: usize,
+        mut step: impl FnMut(usize, &mut GodObject, &Pose),
+    ) {
         let start = Pose::new(Vector3::new(0.16, 0.02, 0.0), Vector3::new(0.0, 2.0, 0.0));
         let settings = Settings::for_size(SIZE);
         let mut god_object =
             GodObject::new(Arc::clone(world), settings, start).expect("apart at the start");
-        let mut hand = SlidingHand::new(start, 1, self.step);
-        for k in 0..APPROACH + self.updates {
+        let mut hand = SlidingHand::new(start, seed, self.step);
+        for k in 0..APPROACH + updates {
             let device = hand.next(god_object.pose());
             step(k, &mut god_object, &device);
         }
