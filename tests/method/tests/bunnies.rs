@@ -3,8 +3,7 @@
 use taut_method_tests::variants::bunnies::{SLIDES, load};
 use taut_method_tests::variants::measure::quantile;
 
-/// Most that sets of four hands are off by at the 98th and 99th percentile and in the worst, of the slow and the fast slide. One hand alone may be off by a
-/// third of that or by twice as much: where it happens to press, one set in a hundred lacks a row.
+/// Most that sets of four hands are off by at the 98th and 99th percentile and in the worst, of the slow and the fast slide.
 const BOUNDS: [[f64; 3]; 2] = [[0.01, 0.0125, 0.5], [0.05, 0.2, 0.7]];
 
 /// Where a hand goes farther in an update than the work of a collection reaches, up to 3 mm, some rows are missing.

@@ -16,7 +16,8 @@ const SIZE: f64 = 0.15;
 const APPROACH: usize = 60;
 /// Every so many sets are held against the oracle.
 const ERROR_STRIDE: usize = 5;
-/// Which hands' sets are: where one slides, a wrong set or two of another make a percent of its own. And for what share of the updates each.
+/// Seeds of the hands whose sets are compared, and each hand makes a half of the slide's updates: the worst percent of one hand is a few sets, and hands
+/// differ in it by far.
 const HANDS: [u64; 4] = [1, 2, 3, 4];
 const ERROR_SHARE: usize = 2;
 
