@@ -1,10 +1,11 @@
 //! Conforming contact in many variants, and bunnies: times, rows, force errors, and the worst row of each column.
-//! `cargo run --release -p taut-method-tests --example conforming_variants -- [--quick] [--case NAME] [--repeats N] [--seed N | --seeds N]`.
+//! `cargo run --release -p taut-method-tests --example conforming_variants -- [--quick] [--case NAME] [--repeats N] [--seed N | --seeds N] [--hands N]`.
 //!
 //! Variants `v0`, `v1`, ... cover every two levels of two factors; others have names (`peg`, `peg-floor`, ...). `bunnies` and `motions` need
 //! the test data. Times are CPU time of the thread, us; of `--repeats` runs the median of each percentile is printed. `--case` runs the cases whose
 //! name begins so; `--quick` runs coarser meshes, 2,000 triangles each, for a hundred updates. `--seeds N` runs the designs of the seeds 1 to N, without
 //! the named cases and the bunnies, and prints those rows alone whose force is off by more than 1 %.
+//! `--hands N` (default 4): of how many hands the bunnies' forces are judged.
 
 #[path = "conforming_variants/bunnies.rs"]
 mod bunnies;
@@ -41,6 +42,8 @@ struct Arguments {
     seed: u64,
     /// Designs of this many seeds, from 1 on; 0 is that of `seed` alone.
     seeds: u64,
+    /// That slide a bunny, where its force is judged.
+    hands: u64,
 }
 
 impl Arguments {
@@ -51,6 +54,7 @@ impl Arguments {
             repeats: 3,
             seed: 1,
             seeds: 0,
+            hands: 4,
         };
         let mut given = std::env::args().skip(1);
         while let Some(key) = given.next() {
@@ -69,8 +73,9 @@ impl Arguments {
                 "--repeats" => read.repeats = usize::try_from(number()?).unwrap_or(1).max(1),
                 "--seed" => read.seed = number()?,
                 "--seeds" => read.seeds = number()?,
+                "--hands" => read.hands = number()?.max(1),
                 _ => {
-                    let keys = "--quick, --case, --repeats, --seed or --seeds";
+                    let keys = "--quick, --case, --repeats, --seed, --seeds or --hands";
                     return Err(format!("{key}: give {keys}"));
                 }
             }
@@ -123,7 +128,7 @@ fn main() -> Result<(), String> {
         }
     }
     if arguments.seeds == 0 {
-        bunnies::run(&arguments.case, arguments.repeats);
+        bunnies::run(&arguments.case, arguments.repeats, arguments.hands);
     }
     Ok(())
 }

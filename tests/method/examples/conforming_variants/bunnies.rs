@@ -13,7 +13,7 @@ use taut_scene::data_file;
 use taut_test_kit::thread_cpu_us;
 
 /// The cases whose name begins with `case`; the dense one only where it is named.
-pub(crate) fn run(case: &str, repeats: usize) {
+pub(crate) fn run(case: &str, repeats: usize, hands: u64) {
     let chosen: Vec<&Slide> = SLIDES
         .iter()
         .filter(|slide| slide.name.starts_with(case))
@@ -28,25 +28,26 @@ pub(crate) fn run(case: &str, repeats: usize) {
         return;
     };
     for slide in chosen {
-        run_slide(slide, &bunny, repeats);
+        run_slide(slide, &bunny, repeats, hands);
     }
     if motions {
         run_motions(repeats);
     }
 }
 
-fn run_slide(slide: &Slide, bunny: &Mesh, repeats: usize) {
+fn run_slide(slide: &Slide, bunny: &Mesh, repeats: usize, hands: u64) {
     let world = slide.world(bunny);
     let timed = |_| quantiles(&slide.times(&world, thread_cpu_us));
     let runs: Vec<[f64; 4]> = (0..repeats).map(timed).collect();
     print_medians(slide.name, &runs);
-    let errors = slide.errors(&world);
+    let errors = slide.errors(&world, hands);
     let share = |of| 100.0 * quantile(&errors, of);
     println!(
-        "{:20} force off by {:.2} % at p90, {:.2} % at p99, {:.2} % at most, of {} sets",
+        "{:20} force off by {:.2} % at p90, {:.2} % at p99, {:.2} % at p99.9, {:.2} % at most, of {} sets of {hands} hands",
         "",
         share(0.9),
         share(0.99),
+        share(0.999),
         share(1.0),
         errors.len()
     );

@@ -16,9 +16,7 @@ const SIZE: f64 = 0.15;
 const APPROACH: usize = 60;
 /// Every so many sets are held against the oracle.
 const ERROR_STRIDE: usize = 5;
-/// Seeds of the hands whose sets are compared, and each hand makes a half of the slide's updates: the worst percent of one hand is a few sets, and hands
-/// differ in it by far.
-const HANDS: [u64; 4] = [1, 2, 3, 4];
+/// Each hand whose sets are compared makes a half of the slide's updates.
 const ERROR_SHARE: usize = 2;
 
 /// How a hand slides a bunny.
@@ -87,11 +85,12 @@ impl Slide {
         times
     }
 
-    /// How far every fifth set of several hands is from what all pairs say, for the device one step on; see [`Difference`](super::oracle::Difference).
-    pub fn errors(&self, world: &Arc<World>) -> Vec<f64> {
+    /// How far every fifth set of so many hands is from what all pairs say, for the device one step on; see [`Difference`](super::oracle::Difference).
+    /// The worst percent of one hand is a few sets, and hands differ in it by far.
+    pub fn errors(&self, world: &Arc<World>, hands: u64) -> Vec<f64> {
         let mut oracle = Oracle::default();
         let mut errors = Vec::new();
-        for hand in HANDS {
+        for hand in 1..=hands {
             self.lead(
                 world,
                 hand,
