@@ -308,7 +308,7 @@ impl BridgeLoop {
             stats.max_force_age = stats.max_force_age.max(now.saturating_sub(origin));
         }
         let events = report.events.iter();
-        stats.safety_events += events.filter(|e| !e.kind.is_good_news()).count() as u64;
+        stats.safety_events += events.filter(|e| e.kind.is_warning()).count() as u64;
         stats.faulty_ticks += u64::from(report.reading.fault.is_some());
     }
 

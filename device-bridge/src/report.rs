@@ -108,7 +108,7 @@ pub struct BridgeReport {
     pub max_force_n: f64,
     /// Largest torque rendered, N m.
     pub max_torque_n_m: f64,
-    /// Events of the safety stage.
+    /// Warnings of the safety stage and of the device.
     pub safety_events: u64,
     /// Ticks on which the device had no pose.
     pub faulty_ticks: u64,
@@ -149,7 +149,7 @@ impl BridgeReport {
             ),
             (
                 self.safety_events > 0,
-                format!("{} safety events (in the log at level info)", self.safety_events),
+                format!("{} safety events (in the log)", self.safety_events),
             ),
         ]
         .into_iter()

@@ -182,10 +182,10 @@ impl EventKind {
         }
     }
 
-    /// Whether it is part of normal work.
+    /// Whether it is worth a warning, and counts in reports: it is no part of normal work.
     #[must_use]
-    pub fn is_good_news(self) -> bool {
-        matches!(
+    pub fn is_warning(self) -> bool {
+        !matches!(
             self,
             Self::Arming
                 | Self::Armed
@@ -193,14 +193,10 @@ impl EventKind {
                 | Self::DeadManReleased
                 | Self::DeviceBack
                 | Self::PassivityActs // as it does in any contact, where it is on
+                // A body that slips off an edge lets go of its force at once; the limit makes a ramp of that, as it is there to do.
+                | Self::ForceSlewLimited
+                | Self::TorqueSlewLimited
         )
-    }
-
-    /// Whether it is worth a warning: neither part of normal work, nor the limit of change. A contact that slips off an edge lets go of its force at once;
-    /// the limit makes a ramp of that, as it is there to do.
-    #[must_use]
-    pub fn is_warning(self) -> bool {
-        !self.is_good_news() && !matches!(self, Self::ForceSlewLimited | Self::TorqueSlewLimited)
     }
 
     /// Whether it is a fault: of the device's samples, or of the computed wrench.
@@ -351,12 +347,25 @@ mod tests {
     }
 
     #[test]
+    fn each_fault_is_a_warning_and_what_a_contact_does_is_none() {
+        for kind in EventKind::ALL.into_iter().filter(|kind| kind.is_fault()) {
+            assert!(kind.is_warning(), "{kind:?}");
+        }
+        let in_contact = [
+            EventKind::ForceSlewLimited,
+            EventKind::TorqueSlewLimited,
+            EventKind::PassivityActs,
+        ];
+        assert!(!in_contact.into_iter().any(EventKind::is_warning));
+    }
+
+    #[test]
     fn a_string_fault_is_its_own_kind_and_names_the_string() {
         use taut_spidar::StringFault;
         let kind_of = |fault| {
             let (kind, value) = kind_of_fault(&DeviceFault::Strings(fault));
             assert_eq!(kind, EventKind::DeviceStrings);
-            assert!(kind.is_fault() && !kind.is_good_news());
+            assert!(kind.is_fault() && kind.is_warning());
             let event = SafetyEvent {
                 number: 1,
                 time: Duration::ZERO,

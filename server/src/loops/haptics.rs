@@ -273,7 +273,7 @@ impl HapticsLoop {
         let statistics = &self.statistics;
         for event in report.events.iter() {
             statistics.incidents.count(event);
-            if !event.kind.is_good_news() {
+            if event.kind.is_warning() {
                 let events = &statistics.safety_events;
                 events.store(events.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
             }

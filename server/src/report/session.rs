@@ -58,7 +58,7 @@ pub struct SessionReport {
     pub packets_sent: u64,
     /// Datagrams that were refused: broken, foreign, replayed.
     pub packets_refused: u64,
-    /// Times at which the safety stage or a device fault changed the force.
+    /// Warnings of the safety stage and of the device.
     pub safety_events: u64,
     /// Largest norm of a force that the hand felt, N.
     #[serde(default)]
@@ -121,10 +121,7 @@ impl SessionReport {
             }
         }
         if self.safety_events > 0 {
-            faults.push(format!(
-                "{} safety events (in the log at level info)",
-                self.safety_events
-            ));
+            faults.push(format!("{} safety events (in the log)", self.safety_events));
         }
         if faults.is_empty() {
             "verdict             good: deadlines kept, no penetration, no safety event".to_owned()
