@@ -36,7 +36,7 @@ pub fn read_environment(path: &Path) -> Result<Panorama, Problem> {
         ))
     })?;
     let (width, height) = (picture.width(), picture.height());
-    if width != 2 * height {
+    if width != 2 * height || height == 0 {
         return Err(fail(format!(
             "is {width} x {height} pixels, but a picture of all directions is twice as wide as high; save it as an equirectangular one"
         )));
@@ -117,9 +117,15 @@ mod tests {
             "{square}"
         );
         let directory = tempfile::tempdir().expect("a directory");
-        let path = directory.path().join("text.hdr");
-        std::fs::write(&path, "no picture").expect("written");
-        let fault = read_environment(&path).expect_err("text").to_string();
+        let of_text = |name: &str, text: &str| {
+            let path = directory.path().join(name);
+            std::fs::write(&path, text).expect("written");
+            read_environment(&path).expect_err(name).to_string()
+        };
+        let fault = of_text("text.hdr", "no picture");
         assert!(fault.contains("save it as a Radiance picture"), "{fault}");
+        let header = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 0\n";
+        let fault = of_text("empty.hdr", header);
+        assert!(fault.contains("empty.hdr: is 0 x 0 pixels"), "{fault}");
     }
 }

@@ -38,10 +38,11 @@ pub(crate) fn arm_board(bytes: &[u8]) {
         assert!(frame.angles.iter().all(|angle| angle.abs() <= 7.0));
         let norm = frame.orientation().norm();
         assert!((norm - 1.0).abs() < 1e-9, "{frame:?}");
-        let written = frame
-            .line()
-            .and_then(|line| polhem::Frame::parse(&line).ok());
-        assert_eq!(written.map(|again| again.info), Some(frame.info));
+        // Flags of ten digits leave no room for the decimals that are written.
+        if let Some(line) = frame.line() {
+            let again = polhem::Frame::parse(&line).map(|again| again.info);
+            assert_eq!(again, Ok(frame.info));
+        }
     }
     if let Some(force) = polhem::read_force(bytes) {
         assert!(force.iter().all(|part| part.is_finite()));

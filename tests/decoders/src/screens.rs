@@ -63,7 +63,8 @@ pub(crate) fn environment_hdr_seeds() -> Vec<Vec<u8>> {
     let mut file = Vec::new();
     let written = image::codecs::hdr::HdrEncoder::new(&mut file).encode(&pixels, 16, 8);
     assert!(written.is_ok(), "{written:?}");
-    vec![file]
+    let empty = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 0\n";
+    vec![file, empty.to_vec()]
 }
 
 /// Two by two grey pixels.
