@@ -38,10 +38,12 @@ pub(crate) fn arm_board(bytes: &[u8]) {
         assert!(frame.angles.iter().all(|angle| angle.abs() <= 7.0));
         let norm = frame.orientation().norm();
         assert!((norm - 1.0).abs() < 1e-9, "{frame:?}");
-        // Flags of ten digits leave no room for the decimals that are written.
+        // Behind the longest of the other numbers there is room for two digits and a sign.
         if let Some(line) = frame.line() {
             let again = polhem::Frame::parse(&line).map(|again| again.info);
             assert_eq!(again, Ok(frame.info));
+        } else {
+            assert!(frame.info.unsigned_abs() > 99, "{frame:?}");
         }
     }
     if let Some(force) = polhem::read_force(bytes) {

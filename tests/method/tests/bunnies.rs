@@ -3,6 +3,7 @@
 use taut_method_tests::variants::bunnies::{SLIDES, load};
 use taut_method_tests::variants::measure::quantile;
 
+/// As many hands, since where one presses, a set in a hundred may lack a row, and another's lacks none.
 const HANDS: u64 = 4;
 /// Most that their sets are off by at the 98th and 99th percentile and in the worst, of the slow and the fast slide.
 const BOUNDS: [[f64; 3]; 2] = [[0.01, 0.0125, 0.5], [0.05, 0.2, 0.7]];
