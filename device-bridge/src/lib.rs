@@ -80,6 +80,7 @@ pub use external::{
 pub use own_thread::OwnThread;
 pub use placement::Placement;
 pub use plugged::{PluggedPort, plugged_ports};
+pub use plugin::{VENDOR_LIBRARIES, VendorLibrary, VendorLibraryState};
 pub use port::{
     ArmingState, Command, CommandSource, ContactBound, DevicePort, EnergyObserver, EventKind,
     Events, MAX_EVENTS_PER_TICK, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent,

@@ -106,6 +106,58 @@ fn a_reader_that_goes_away_ends_a_command_quietly() {
     }
 }
 
+/// Of three libraries one loads, one is no library, and one needs what is not there.
+#[test]
+fn doctor_says_which_vendors_libraries_can_be_loaded() {
+    let place = Workplace::new();
+    place.write(
+        "broken.c",
+        "extern int xdr_of_nobody(void);\nint virtOpen(void) { return xdr_of_nobody(); }\n",
+    );
+    place.write("whole.c", "int dhdOpen(void) { return 0; }\n");
+    place.write("libHD.so", "no library\n");
+    for (source, library) in [("whole.c", "libdhd.so"), ("broken.c", "libVirtuoseAPI.so")] {
+        let built = Command::new("cc")
+            .args(["-shared", "-fPIC", "-o"])
+            .args([place.path(library), place.path(source)])
+            .status();
+        assert!(built.expect("no cc").success(), "{library}");
+    }
+    let says = |found: Option<&Path>| {
+        let mut doctor = Command::new(env!("CARGO_BIN_EXE_taut"));
+        match found {
+            Some(folder) => doctor.env("LD_LIBRARY_PATH", folder),
+            None => doctor.env_remove("LD_LIBRARY_PATH"),
+        };
+        let output = doctor.arg("doctor").output().expect("no doctor");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let with = says(Some(&place.path("")));
+    let lines: Vec<&str> = with
+        .lines()
+        .filter(|line| line.contains("vendor"))
+        .collect();
+    let [dhd, hd, virtuose] = lines.as_slice() else {
+        panic!("{with}");
+    };
+    assert!(
+        dhd.starts_with("ok  vendor's library: libdhd.so") && dhd.contains("plugin:./taut_dhd.so"),
+        "{dhd}"
+    );
+    assert!(hd.starts_with("--") && hd.contains("libHD.so"), "{hd}");
+    assert!(
+        virtuose.starts_with("--") && virtuose.contains("xdr_of_nobody"),
+        "{virtuose}"
+    );
+    assert!(with.contains("mend: LD_PRELOAD=libtirpc.so.3"), "{with}");
+    let without = says(None);
+    assert!(
+        without.contains("ok  vendors' libraries: none of libdhd.so"),
+        "{without}"
+    );
+}
+
 #[test]
 fn the_version_names_the_build() {
     let output = taut(&["--version"]);

@@ -21,6 +21,25 @@ const ENTRY: &str = "taut_device_entry";
 /// Longest text of an error that is read, with its end.
 const TEXT: usize = 256;
 
+/// Whether the system's loader finds this file and can load it, with every symbol that it needs. It stays loaded until the process ends, as does
+/// what it began.
+///
+/// # Errors
+/// What the system says.
+pub(super) fn loads(file: &str) -> Result<(), String> {
+    #[cfg(unix)]
+    let open = |file| {
+        use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+        // SAFETY: a library on the loader's paths is code that an administrator installed; its initialisers run here.
+        unsafe { Library::open(Some(file), RTLD_NOW | RTLD_LOCAL) }
+    };
+    #[cfg(not(unix))]
+    // SAFETY: as above.
+    let open = |file| unsafe { Library::new(file) };
+    std::mem::forget(open(file).map_err(|error| error.to_string())?);
+    Ok(())
+}
+
 type Entry = unsafe extern "C" fn() -> *const RawTable;
 
 /// `taut_device_table`; a null pointer to a function is `None`.

@@ -8,8 +8,8 @@
 //! | `printed`      | what that process prints                                              |
 //! | `taut_host.py` | the program of that process, which calls the file                     |
 //! | `claims`       | what either may say of its device, and which samples are ones         |
-//! | `pace`         | how long the calls take                                               |
 //! | `talker`       | the thread that calls them                                            |
+//! | `vendors`      | the vendors' libraries that a plug-in of ours calls                   |
 
 mod claims;
 mod error;
@@ -21,6 +21,7 @@ mod printed;
 #[cfg(unix)]
 mod python;
 mod talker;
+mod vendors;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,6 +32,7 @@ pub use error::PluginError;
 #[cfg(unix)]
 pub use frame::{ReadAnswer, read_answer};
 pub use talker::Plugin;
+pub use vendors::{VENDOR_LIBRARIES, VendorLibrary, VendorLibraryState};
 
 use claims::RawSample;
 

@@ -1,10 +1,13 @@
 //! Force devices that are plugged in: what they can render, and the stiffness that their rate and delay bear. None of it is needed, and nothing is
-//! moved: the Inverse service is asked for states alone, serial ports are listed and not spoken to.
+//! moved: the Inverse service is asked for states alone, serial ports are listed and not spoken to, vendors' libraries are loaded and not called.
 
 use std::time::Duration;
 
 use taut_bridge::haply::{self, HaplyError, HaplyFound, ServiceAddress};
-use taut_bridge::{DeviceChoice, Grip, HaplySettings, InputChoice, PluggedPort, plugged_ports};
+use taut_bridge::{
+    DeviceChoice, Grip, HaplySettings, InputChoice, PluggedPort, VENDOR_LIBRARIES, VendorLibrary,
+    VendorLibraryState, plugged_ports,
+};
 
 use super::Finding;
 
@@ -24,7 +27,55 @@ pub(super) fn force_devices(service: &ServiceAddress) -> Vec<Finding> {
         Ok(ports) => findings.extend(ports.iter().map(port)),
         Err(cause) => findings.push(Finding::good("serial and HID ports", cause)),
     }
+    findings.extend(vendors_libraries());
     findings
+}
+
+/// Each that is there; where none is, a sentence.
+fn vendors_libraries() -> Vec<Finding> {
+    let found: Vec<Finding> = VENDOR_LIBRARIES
+        .iter()
+        .filter_map(|library| vendors_library(library, &library.state()))
+        .collect();
+    if !found.is_empty() {
+        return found;
+    }
+    let each = VENDOR_LIBRARIES.map(|library| format!("{} ({})", library.file, library.vendor));
+    let none = format!(
+        "none of {} is where the system's loader looks; one elsewhere is named by its plug-in's option library=PATH",
+        each.join(", ")
+    );
+    vec![Finding::good("vendors' libraries", none)]
+}
+
+fn vendors_library(library: &VendorLibrary, state: &VendorLibraryState) -> Option<Finding> {
+    const WHAT: &str = "vendor's library";
+    let VendorLibrary {
+        vendor,
+        file,
+        plugin,
+    } = library;
+    match state {
+        VendorLibraryState::Absent => None,
+        VendorLibraryState::Loads => Some(Finding::good(
+            WHAT,
+            format!(
+                "{file} ({vendor}) can be loaded; build its plug-in device-bridge/plugins/{plugin}.c as docs/devices.md says, and read it by --device plugin:./taut_{plugin}.so"
+            ),
+        )),
+        VendorLibraryState::Broken(cause) => Some(Finding::lacking(
+            WHAT,
+            format!("{file} ({vendor}) is there and cannot be loaded: {cause}"),
+            if cause.contains("undefined symbol: xdr_") {
+                "LD_PRELOAD=libtirpc.so.3 taut doctor  # it needs that library and does not say so"
+                    .to_owned()
+            } else {
+                format!(
+                    "LD_DEBUG=libs taut doctor 2>&1 | grep -A9 {file}  # shows which file it is, and what it lacks: install that"
+                )
+            },
+        )),
+    }
 }
 
 fn inverse_service(service: &ServiceAddress) -> Finding {
