@@ -2,7 +2,8 @@
 //! `cargo run --release -p taut-method-tests --example conforming_variants -- [--quick] [--case NAME] [--repeats N] [--seed N | --seeds N] [--hands N]`.
 //!
 //! Variants `v0`, `v1`, ... cover every two levels of two factors; others have names (`peg`, `peg-floor`, ...). `bunnies` and `motions` need
-//! the test data. Times are CPU time of the thread, us; of `--repeats` runs the median of each percentile is printed. `--case` runs the cases whose
+//! the test data. Times are CPU time of the thread, us; of `--repeats` runs the median of each percentile is printed. `work` is what the counted work
+//! would take on a nominal machine, us: it is the same in every run. `--case` runs the cases whose
 //! name begins so; `--quick` runs coarser meshes, 2,000 triangles each, for a hundred updates. `--seeds N` runs the designs of the seeds 1 to N, without
 //! the named cases and the bunnies, and prints those rows alone whose force is off by more than 1 %.
 //! `--hands N` (default 4): of how many hands the bunnies' forces are judged.
@@ -21,10 +22,11 @@ type Column = (&'static str, fn(&Outcome) -> f64);
 /// Of many designs, rows that are off by less are not printed.
 const SHOWN_ERROR: f64 = 0.01;
 
-const COLUMNS: [Column; 11] = [
+const COLUMNS: [Column; 12] = [
     ("p50", |o| quantile(&o.update, 0.5)),
     ("p99", |o| quantile(&o.update, 0.99)),
     ("max", |o| quantile(&o.update, 1.0)),
+    ("work p99", |o| quantile(&o.work, 0.99)),
     ("force p99", |o| quantile(&o.force, 0.99)),
     ("error %", |o| 100.0 * quantile(&o.errors, 1.0)),
     ("rows p50", |o| quantile(&o.rows, 0.5)),

@@ -37,9 +37,14 @@ pub(crate) fn run(case: &str, repeats: usize, hands: u64) {
 
 fn run_slide(slide: &Slide, bunny: &Mesh, repeats: usize, hands: u64) {
     let world = slide.world(bunny);
-    let timed = |_| quantiles(&slide.times(&world, thread_cpu_us));
-    let runs: Vec<[f64; 4]> = (0..repeats).map(timed).collect();
-    print_medians(slide.name, &runs);
+    let runs: Vec<[Vec<f64>; 2]> = (0..repeats)
+        .map(|_| slide.times(&world, thread_cpu_us))
+        .collect();
+    let times: Vec<[f64; 4]> = runs.iter().map(|[times, _]| quantiles(times)).collect();
+    print_medians(slide.name, &times);
+    if let Some([_, work]) = runs.first() {
+        print_medians(&format!("{} work", slide.name), &[quantiles(work)]);
+    }
     let errors = slide.errors(&world, hands);
     let share = |of| 100.0 * quantile(&errors, of);
     println!(

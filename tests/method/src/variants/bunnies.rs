@@ -72,17 +72,18 @@ impl Slide {
         })
     }
 
-    /// Time of each update in contact, in the unit of `clock`.
-    pub fn times(&self, world: &Arc<World>, clock: impl Fn() -> f64) -> Vec<f64> {
-        let mut times = Vec::new();
+    /// Of each update in contact the time, in the unit of `clock`, and what its work would take on a nominal machine, us.
+    pub fn times(&self, world: &Arc<World>, clock: impl Fn() -> f64) -> [Vec<f64>; 2] {
+        let (mut times, mut works) = (Vec::new(), Vec::new());
         self.lead(world, 1, self.updates, |k, god_object, device| {
             let before = clock();
-            god_object.step(device, None);
+            let report = god_object.step(device, None);
             if k >= APPROACH {
                 times.push(clock() - before);
+                works.push(report.work.nominal_us() as f64);
             }
         });
-        times
+        [times, works]
     }
 
     /// How far every fifth set of so many hands is from what all pairs say, for the device one step on; see [`Difference`](super::oracle::Difference).

@@ -26,6 +26,8 @@ pub struct Outcome {
     pub triangles: [usize; 2],
     /// Of the updates, in the unit of the clock.
     pub update: Vec<f64>,
+    /// What their work would take on a nominal machine, us: the same in every run.
+    pub work: Vec<f64>,
     /// Of the forces, in the unit of the clock.
     pub force: Vec<f64>,
     /// Sub-steps of the updates.
@@ -89,6 +91,7 @@ pub fn run(
         let before = clock();
         let report = god_object.step(&device, shaded.as_ref());
         outcome.update.push(clock() - before);
+        outcome.work.push(report.work.nominal_us() as f64);
         // The device has gone on when the force is computed.
         let device = scene.device(time + PERIOD);
         let set = god_object.constraint_set();
