@@ -183,8 +183,7 @@ impl GodObject {
     fn complete_for(&mut self, motions: &[Vector6], purpose: Purpose, work: &mut Work) {
         self.with_reduction(|this, reduction, at| {
             let answers = this.answers(reduction, at, motions, purpose, work);
-            let count = answers.len().min(SEARCHED_MOTIONS);
-            let searched = (&motions[..count], &answers[..count]);
+            let searched = &answers[..answers.len().min(SEARCHED_MOTIONS)];
             if this.search(reduction, at, searched, purpose, work) {
                 this.answers(reduction, at, motions, purpose, work);
             }

@@ -217,7 +217,7 @@ impl RowReduction {
             obstacle,
             placement: &placement,
             obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
-            activation_distance: NEAR_REST_DISTANCES * at.rest_distance,
+            activation_distance: TOUCHING_REST_DISTANCES * at.rest_distance,
             past_reentrant_edges: false,
         };
         // The features that touch may be other triangles' to look at.
