@@ -33,7 +33,7 @@ pub fn file_name_fault(name: &str, endings: &[&str]) -> Option<String> {
     }
     if ending == "mpcdi" {
         return Some(format!(
-            "\"{name}\" is an MPCDI archive, which is not read as such; it is a zip file: take its .pfm maps and .png masks out, and name those"
+            "\"{name}\" is an MPCDI archive, which is not read as such; it is a zip file: take its .pfm maps and .png masks out, and name those (docs/screens.md, MPCDI)"
         ));
     }
     Some(format!(
@@ -46,15 +46,18 @@ pub fn file_name_fault(name: &str, endings: &[&str]) -> Option<String> {
     ))
 }
 
-/// Reads the warp of a flat screen: Paul Bourke's mesh, or a float map of u, v and anything. `aspect`: width over height
-/// of the output, as far as it is known: what lies far beyond it is refused. [`OutputMesh::for_output`] fits the mesh to the output.
+/// Reads the warp of a flat screen: Paul Bourke's mesh, or a float map of u, v and anything; nothing is drawn where both are NaN. `aspect`: width over
+/// height of the output, as far as it is known: what lies far beyond it is refused. [`OutputMesh::for_output`] fits the mesh to the output.
 pub fn read_warp(path: &Path, aspect: f64) -> Result<OutputMesh, Fault> {
     let read = || {
         if ending_of(path) == "pfm" {
             let map = map_of(path, 3)?;
             let off = |value: f32| !(-ROUNDING..=1.0 + ROUNDING).contains(&value); // true for NaN
-            if let Some(place) = find(&map, |pixel| off(pixel[0]) || off(pixel[1])) {
-                let text = "has a place in the picture that is not 0 to 1 each way";
+            // Calibration programs mark so what the projector does not light.
+            let is_unlit = |pixel: &[f32]| pixel[0].is_nan() && pixel[1].is_nan();
+            let is_wrong = |pixel: &[f32]| !is_unlit(pixel) && (off(pixel[0]) || off(pixel[1]));
+            if let Some(place) = find(&map, is_wrong) {
+                let text = "has a place in the picture that is not 0 to 1 each way, nor NaN both ways where nothing is drawn";
                 return Err(Unnamed::new(format!("{text}, at {place}")));
             }
             let at = |c, r| {
@@ -141,7 +144,7 @@ fn unfolded(
 ) -> Result<OutputMesh, Unnamed> {
     if mesh.triangles().next().is_none() {
         return Err(Unnamed::new(
-            "draws nothing: every triangle has a node with an intensity below 0",
+            "draws nothing: every triangle has a node that is not drawn",
         ));
     }
     match fold(&mesh) {
@@ -255,9 +258,36 @@ mod tests {
         let (_keep, path) = written("wall.pfm", &points);
         let fault = read_warp(&path, 1.0).expect_err("refused").to_string();
         assert!(
-            fault.contains("not 0 to 1 each way, at column 2, row 0"),
+            fault.contains("not 0 to 1 each way") && fault.contains("at column 2, row 0"),
             "{fault}"
         );
+    }
+
+    /// As calibration programs mark pixels that light no screen; one number of two is a fault.
+    #[test]
+    fn nothing_is_drawn_where_a_warp_has_no_place() {
+        let unlit = |second: f32| {
+            map(4, 3, move |c, r| match (c, r) {
+                (3, 2) => [f32::NAN, second, f32::NAN],
+                _ => [c as f32 * 0.3, r as f32 * 0.4, f32::NAN],
+            })
+        };
+        let (_keep, path) = written("wall.pfm", &unlit(f32::NAN));
+        let mesh = read_warp(&path, 1.0).expect("a warp");
+        // The node itself, and the border that would be carried on from it: above, aside and at the corner.
+        let dark: Vec<usize> = (0..mesh.nodes.len())
+            .filter(|&k| mesh.nodes[k].share < 0.0)
+            .collect();
+        assert_eq!(dark, [22, 23, 28, 29]);
+        assert_eq!(mesh.triangles().count(), 2 * 5 * 4 - 8);
+        let finite = |node: &crate::OutputNode| node.target.iter().all(|x| x.is_finite());
+        assert!(mesh.nodes.iter().all(finite));
+        let (_keep, path) = written("half.pfm", &unlit(0.5));
+        let fault = read_warp(&path, 1.0).expect_err("refused").to_string();
+        assert!(fault.contains("at column 3, row 2"), "{fault}");
+        let (_keep, path) = written("dark.pfm", &map(4, 3, |_, _| [f32::NAN; 3]));
+        let fault = read_warp(&path, 1.0).expect_err("refused").to_string();
+        assert!(fault.contains("draws nothing"), "{fault}");
     }
 
     #[test]

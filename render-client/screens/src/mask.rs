@@ -1,11 +1,11 @@
 //! Blend masks: the share of its light that each pixel of an output keeps.
 //!
-//! A grey PNG of 8 or 16 bits, or a PFM of one value, as large as the output. A PNG's white is 1. Values are shares of light unless the workbench
+//! A grey PNG of 8 or 16 bits (in one colour or in three equal ones), or a PFM of one value, as large as the output. A PNG's white is 1. Values are shares of light unless the workbench
 //! file gives `blend_gamma`: then they are a signal, and the share is its power of that exponent (MPCDI: `gammaEmbedded` of the alpha map).
 
 use std::io::Cursor;
 
-use image::{ColorType, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 
 use crate::fault::Unnamed;
 use crate::pfm::{FloatMap, MAX_SIDE};
@@ -43,7 +43,14 @@ pub(crate) fn from_png(bytes: Vec<u8>, gamma: f64) -> Result<Mask, Unnamed> {
             "cannot be read as a blend mask ({error}); save it as a grey PNG as large as the output"
         ))
     })?;
-    if !matches!(picture.color(), ColorType::L8 | ColorType::L16) {
+    // MPCDI's alpha maps are grey in three colours; three shares for a pixel are another matter.
+    let is_grey = match &picture {
+        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLuma16(_) => true,
+        DynamicImage::ImageRgb8(all) => all.pixels().all(|p| p.0 == [p.0[0]; 3]),
+        DynamicImage::ImageRgb16(all) => all.pixels().all(|p| p.0 == [p.0[0]; 3]),
+        _ => false,
+    };
+    if !is_grey {
         return Err(Unnamed::new(
             "is a coloured picture, but a blend mask has one grey value for each pixel; save it as a grey PNG of 16 bits",
         ));
@@ -99,7 +106,7 @@ fn checked(mask: Mask) -> Result<Mask, Unnamed> {
 mod tests {
     use super::*;
 
-    fn png(picture: &image::DynamicImage) -> Vec<u8> {
+    fn png(picture: &DynamicImage) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
         picture
             .write_to(&mut bytes, ImageFormat::Png)
@@ -110,11 +117,18 @@ mod tests {
     #[test]
     fn grey_is_a_share_of_light_and_a_signal_with_a_gamma() {
         let ramp = image::ImageBuffer::from_fn(3, 2, |x, _| image::Luma([(x * 32_767) as u16]));
-        let bytes = png(&image::DynamicImage::ImageLuma16(ramp));
+        let bytes = png(&DynamicImage::ImageLuma16(ramp));
         let linear = from_png(bytes.clone(), 1.0).expect("a mask");
         assert!((linear.shares[1] - 0.5).abs() < 1e-4 && (linear.shares[2] - 1.0).abs() < 1e-4);
         let encoded = from_png(bytes, 2.2).expect("a mask");
         assert!((encoded.shares[1] - 0.5_f32.powf(2.2)).abs() < 1e-4);
+    }
+
+    #[test]
+    fn grey_in_three_colours_is_grey() {
+        let ramp = image::ImageBuffer::from_fn(3, 2, |x, _| image::Rgb([(x * 100) as u8; 3]));
+        let mask = from_png(png(&DynamicImage::ImageRgb8(ramp)), 1.0).expect("a mask");
+        assert!((mask.shares[1] - 100.0 / 255.0).abs() < 1e-4, "{mask:?}");
     }
 
     #[test]
@@ -143,14 +157,18 @@ mod tests {
 
     #[test]
     fn colours_blackness_and_bombs_are_refused() {
-        let coloured = png(&image::DynamicImage::new_rgb8(4, 4));
+        // The last pixel differs by one part of 65,535.
+        let nearly = image::ImageBuffer::from_fn(4, 4, |x, y| {
+            image::Rgb([900_u16, 900, 900 + u16::from(x + y == 6)])
+        });
+        let coloured = png(&DynamicImage::ImageRgb16(nearly));
         assert!(
             from_png(coloured, 1.0)
                 .expect_err("colours")
                 .text
                 .contains("coloured")
         );
-        let black = png(&image::DynamicImage::new_luma8(4, 4));
+        let black = png(&DynamicImage::new_luma8(4, 4));
         assert!(
             from_png(black, 1.0)
                 .expect_err("black")
@@ -158,7 +176,7 @@ mod tests {
                 .contains("black all over")
         );
         // A header of 16,000 x 16,000 RGBA pixels with hardly any data: refused by the limit, not by memory.
-        let mut bomb = png(&image::DynamicImage::new_rgba16(1, 1));
+        let mut bomb = png(&DynamicImage::new_rgba16(1, 1));
         let side = 16_000_u32.to_be_bytes();
         bomb[16..20].copy_from_slice(&side);
         bomb[20..24].copy_from_slice(&side);

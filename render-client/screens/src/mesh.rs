@@ -79,7 +79,7 @@ impl OutputMesh {
     }
 
     /// The grid whose nodes are the middles of `columns` x `rows` equal parts of the output, with a border carried on
-    /// linearly to its edges.
+    /// linearly to its edges. Nothing is drawn at a node whose target is NaN, nor at a border that would be carried on from one.
     pub(crate) fn of_parts(
         target: Target,
         columns: usize,
@@ -107,10 +107,14 @@ impl OutputMesh {
         };
         let places =
             (0..rows + 2).flat_map(|row| (0..columns + 2).map(move |column| (column, row)));
-        let node = |(column, row)| OutputNode {
-            place: [share_of(column, columns), share_of(row, rows)],
-            target: value(column, row),
-            share: 1.0,
+        let node = |(column, row)| {
+            let target = value(column, row);
+            let is_drawn = !target.iter().any(|x| x.is_nan());
+            OutputNode {
+                place: [share_of(column, columns), share_of(row, rows)],
+                target: if is_drawn { target } else { [0.0; 3] },
+                share: if is_drawn { 1.0 } else { -1.0 },
+            }
         };
         Self {
             target,
