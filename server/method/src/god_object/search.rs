@@ -12,7 +12,7 @@ use crate::spatial::Vector6;
 
 /// How much more work a search for the force may take where an obstacle stopped the body in this update, which says that pairs are missing; and how much
 /// less a search for a motion, which needs no more than what it violates deepest: an obstacle stops it otherwise. Of 310 variants of conforming
-/// parts (`conforming_variants --quick`, seeds 1 to 12) the force is off by at most 71, 6 and 6 % with 4, 16 and 64 times as much.
+/// parts (`conforming_variants --quick`, seeds 1 to 12) the force is off by at most 77, 25 and 25 % with 4, 16 and 64 times as much.
 const SEARCH_FACTOR: u64 = 16;
 
 impl GodObject {
