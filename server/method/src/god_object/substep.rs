@@ -19,6 +19,9 @@ const LEAST_STEP_SHARE: f64 = 0.1;
 /// A body with less than this share of the rest distance left is eased out in the same update, however little that is: left to the next, the force on a rough
 /// peg in a hole of 5 um is off by half.
 const TIGHT_GAP_SHARE: f64 = 0.5;
+/// Most by which motions become shorter when one turns back on the last: where the hand rests, a long way back after a tiny one would else keep the body
+/// where it is until the damping has doubled so often.
+const LARGEST_DAMPING: f64 = 16.0;
 /// A sub-step that loses more than this share of the rest distance to what is nearest shows the same.
 const LOST_GAP_SHARE: f64 = 0.5;
 /// Most shares of its way that a sub-step asks for, until rounds come to rest; what the last one gives is cut.
@@ -257,7 +260,7 @@ impl StepMemory {
         if along < 0.0 {
             // Aitken's extrapolation: motions in proportion to the way that is left would end here.
             let ratio = along / weighed(&self.last_motion, &self.last_motion);
-            self.damping /= 1.0 - ratio;
+            self.damping /= (1.0 - ratio).min(LARGEST_DAMPING);
         } else if along > 0.0 {
             self.grow();
         }
