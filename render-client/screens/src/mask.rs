@@ -1,7 +1,7 @@
 //! Blend masks: the share of its light that each pixel of an output keeps.
 //!
-//! A grey PNG of 8 or 16 bits (in one colour or in three equal ones), or a PFM of one value, as large as the output. A PNG's white is 1. Values are shares of light unless the workbench
-//! file gives `blend_gamma`: then they are a signal, and the share is its power of that exponent (MPCDI: `gammaEmbedded` of the alpha map).
+//! A grey PNG of 8 or 16 bits (in one colour or in three equal ones), or a PFM of one value, as large as the output. A PNG's white is 1.
+//! Values are shares of light unless the workbench file gives `blend_gamma`: then they are a signal, and the share is its power of that exponent (MPCDI: `gammaEmbedded` of the alpha map).
 
 use std::io::Cursor;
 

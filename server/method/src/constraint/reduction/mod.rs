@@ -66,9 +66,9 @@ const IDLE_UPDATES: u32 = 8;
 /// The same for a row that is implied: it matters in the corner that the body is in, and nowhere else.
 const IDLE_UPDATES_IMPLIED: u32 = 1;
 
-/// Pairs up to this many rest distances apart touch.
+/// Pairs up to this many rest distances apart touch; of what stopped the body those are rows.
 const TOUCHING_REST_DISTANCES: f64 = 2.0;
-/// A row of a gap up to so many rest distances holds the body, or will soon; and what stopped the body is a row where it is as near.
+/// A row of a gap up to so many rest distances holds the body, or will soon.
 const NEAR_REST_DISTANCES: f64 = 4.0;
 
 /// Finds rows as motions need them.
