@@ -77,13 +77,9 @@ impl VrpnServer {
     pub fn start(settings: VrpnSettings, feed: StateFeed) -> io::Result<Self> {
         let runtime = runtime()?;
         let guard = runtime.enter();
-        let listener = listen(SocketAddr::V4(settings.address))?;
-        let SocketAddr::V4(address) = listener.local_addr()? else {
-            unreachable!("it was bound to an IPv4 address");
-        };
-        let datagrams = std::net::UdpSocket::bind(address)?;
-        datagrams.set_nonblocking(true)?;
-        let datagrams = Arc::new(UdpSocket::from_std(datagrams)?);
+        let (listener, datagrams) = open(settings.address)?;
+        let address = ipv4(&listener)?;
+        let datagrams = Arc::new(datagrams);
         drop(guard);
         let counts = Arc::<Counts>::default();
         let (sender, states) = watch::channel(None);
@@ -125,6 +121,41 @@ impl VrpnServer {
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.counts.dropped.load(Ordering::Relaxed)
+    }
+}
+
+/// How often the system is asked for a port that is free for both protocols.
+const PORTS_TRIED: usize = 16;
+
+/// The two sockets of the server, of one port: clients ask by datagram at the port that they connect to. Call it within the runtime.
+///
+/// A port of 0 is any: the system chooses it for TCP, and a stranger may have that port for UDP.
+fn open(asked: SocketAddrV4) -> io::Result<(TcpListener, UdpSocket)> {
+    // Kept until the end, so that the system does not choose one of these again.
+    let mut half_taken = Vec::new();
+    loop {
+        let listener = listen(SocketAddr::V4(asked))?;
+        match std::net::UdpSocket::bind(ipv4(&listener)?) {
+            Ok(datagrams) => {
+                datagrams.set_nonblocking(true)?;
+                return Ok((listener, UdpSocket::from_std(datagrams)?));
+            }
+            Err(error)
+                if error.kind() == io::ErrorKind::AddrInUse
+                    && asked.port() == 0
+                    && half_taken.len() + 1 < PORTS_TRIED =>
+            {
+                half_taken.push(listener);
+            }
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+fn ipv4(listener: &TcpListener) -> io::Result<SocketAddrV4> {
+    match listener.local_addr()? {
+        SocketAddr::V4(address) => Ok(address),
+        SocketAddr::V6(_) => unreachable!("it was bound to an IPv4 address"),
     }
 }
 
@@ -310,5 +341,32 @@ fn now() -> Stamp {
     Stamp {
         seconds: since.as_secs() as u32,
         microseconds: since.subsec_micros(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_port_is_found_among_ports_that_strangers_have_for_one_protocol() {
+        let runtime = runtime().expect("a runtime");
+        let _guard = runtime.enter();
+        // An address of its own: nobody else's ports are taken.
+        let any = SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 88), 0);
+        let strangers: Vec<_> = (0..500)
+            .map(|_| std::net::UdpSocket::bind(any).expect("a port"))
+            .collect();
+        // One of 28,000 ports each time: without a second try, some ten of these would fail.
+        for _ in 0..600 {
+            let (listener, datagrams) = open(any).expect("a port free for both");
+            let same = listener.local_addr().ok() == datagrams.local_addr().ok();
+            assert!(same, "one port for both");
+        }
+        let SocketAddr::V4(taken) = strangers[0].local_addr().expect("bound") else {
+            unreachable!("bound to IPv4");
+        };
+        let refused = open(taken).map(drop).map_err(|error| error.kind());
+        assert_eq!(refused, Err(io::ErrorKind::AddrInUse), "it was asked for");
     }
 }
