@@ -61,6 +61,8 @@ enum SessionEnd {
     TraceEnded,
     /// The server told its clients that it stops.
     ServerStopped,
+    /// The server told them that it begins another session.
+    ServerChanges,
     /// It is gone for another reason.
     ServerLost(String),
 }
@@ -108,6 +110,12 @@ impl Run<'_> {
                 SessionEnd::ServerStopped => {
                     tracing::info!("the server stopped: the force is zero");
                     return Ok(self.report(&bridge, "the server stopped"));
+                }
+                SessionEnd::ServerChanges => {
+                    tracing::info!(
+                        "the server begins another session: the force is zero till then"
+                    );
+                    "it begins another session".to_owned()
                 }
                 SessionEnd::ServerLost(reason) => {
                     tracing::warn!(
@@ -201,6 +209,16 @@ impl Run<'_> {
         };
         let edge = edge_coupler(self.args.coupling, link.coupling())?
             .map(|coupler| coupler.within(period));
+        taut_log::say(&format!(
+            "joined {}, scene {}: the force is computed {}",
+            self.args.server,
+            link.description().name,
+            if edge.is_some() {
+                "here"
+            } else {
+                "at the server"
+            }
+        ));
         bridge.begin_session(source, edge);
         let thread = self.start_device_loop(&link, bridge, period, sender)?;
 
@@ -214,7 +232,7 @@ impl Run<'_> {
         }
         if matches!(
             end,
-            Some(SessionEnd::ServerStopped | SessionEnd::ServerLost(_))
+            Some(SessionEnd::ServerStopped | SessionEnd::ServerChanges | SessionEnd::ServerLost(_))
         ) {
             // Let the force fade as on any silence, rather than cut it.
             let settings = self.safety;
@@ -291,6 +309,7 @@ impl Run<'_> {
         }
         match link.ended() {
             Some(taut_link::SessionEnd::ServerStopped) => Some(SessionEnd::ServerStopped),
+            Some(change) if change.is_change() => Some(SessionEnd::ServerChanges),
             Some(taut_link::SessionEnd::Lost(reason)) => Some(SessionEnd::ServerLost(reason)),
             None if silent => {
                 link.abandon();
@@ -380,9 +399,7 @@ fn edge_coupler(
         (Some(CouplingChoice::Server), _) | (None, None) => Ok(None),
         (_, Some(CouplingOffer::AtEdge(offer))) => Ok(Some(EdgeCoupler::new(offer)?)),
         (None, Some(CouplingOffer::AtServer { reason })) => {
-            tracing::warn!(
-                "the server computes the force, so the network's delay is in it: {reason}"
-            );
+            tracing::warn!("the force is not computed here: {reason}");
             Ok(None)
         }
         (Some(CouplingChoice::Edge), Some(CouplingOffer::AtServer { reason })) => {

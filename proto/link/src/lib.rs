@@ -61,3 +61,5 @@ pub const DEFAULT_UDP_PORT: u16 = 4858;
 
 /// The reason that [`ClientLink::is_closed`] gives when the server ended the session in good order.
 pub const STOP_REASON: &str = "server is stopping";
+/// The same where it ended the session to begin another one.
+pub(crate) const CHANGE_REASON: &str = "the server begins another session";

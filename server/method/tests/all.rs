@@ -41,6 +41,7 @@ mod shape_contacts;
 mod shape_god_object;
 mod shape_support;
 mod shape_time_of_impact;
+mod stops_without_force;
 mod support;
 mod surface_friction;
 mod surface_shading;

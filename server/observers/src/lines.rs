@@ -264,7 +264,8 @@ fn tool(tool: &ToolState) -> Tool<'_> {
 fn head(head: &HeadState) -> Head {
     Head {
         pose: single(&head.pose),
-        age: f64::from(head.age_us) / 1e6,
+        // Of a head that stays where it is, its report is from now, and a little later than the state.
+        age: (f64::from(head.age_us) / 1e6).max(0.0),
         eye_separation: head.eye_separation,
         tracked: head.flags & HEAD_TRACKED != 0,
     }
@@ -326,6 +327,7 @@ mod tests {
             ..ToolState::default()
         });
         state.head.flags = HEAD_TRACKED;
+        state.head.age_us = -1_500;
         state.bodies.push(BodyState {
             id: 3,
             flags: 0,

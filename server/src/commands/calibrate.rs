@@ -30,12 +30,6 @@ fn write_all(
     choice: &GpuChoice,
     folder: &Path,
 ) -> Result<Vec<String>, Failure> {
-    std::fs::create_dir_all(folder).map_err(|error| {
-        Failure::bad_input(format!(
-            "the folder {} cannot be made ({error}); name another one with --out",
-            folder.display()
-        ))
-    })?;
     let nodes = match &args.node {
         Some(node) => vec![node.as_str()],
         None => workbench
@@ -44,9 +38,18 @@ fn write_all(
             .map(|node| node.name.as_str())
             .collect(),
     };
+    let nodes = nodes
+        .into_iter()
+        .map(|node| calibration(args, workbench, node));
+    let calibrations = nodes.collect::<Result<Vec<_>, _>>()?;
+    std::fs::create_dir_all(folder).map_err(|error| {
+        Failure::bad_input(format!(
+            "the folder {} cannot be made ({error}); name another one with --out",
+            folder.display()
+        ))
+    })?;
     let mut written = Vec::new();
-    for node in nodes {
-        let calibration = calibration(args, workbench, node)?;
+    for calibration in calibrations {
         let gpu = Gpu::open_with(choice).map_err(failure)?;
         for (name, bytes) in calibration.pictures(gpu).map_err(failure)? {
             let path = folder.join(name);

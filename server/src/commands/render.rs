@@ -42,25 +42,18 @@ pub(crate) fn run(_args: RenderArgs) -> Result<(), crate::shared::failure::Failu
     )))
 }
 
-/// What this machine draws with, or why it does not; `None` in a build that cannot draw.
+/// What this machine draws with and whether that is software, or why it does not draw; `None` in a build that cannot draw.
 #[cfg(feature = "render")]
-pub(crate) fn adapter() -> Option<Result<String, String>> {
+pub(crate) fn adapter() -> Option<Result<(String, bool), String>> {
     let gpu = taut_render::renderer::Gpu::open();
     Some(
-        gpu.map(|gpu| {
-            let slow = if gpu.is_software() {
-                "; that is software, slow and good for tests: the screens of a workbench need a graphics card"
-            } else {
-                ""
-            };
-            format!("{}{slow}", gpu.chosen())
-        })
-        .map_err(|error| error.to_string()),
+        gpu.map(|gpu| (gpu.chosen().to_string(), gpu.is_software()))
+            .map_err(|error| error.to_string()),
     )
 }
 
-/// What this machine draws with, or why it does not; `None` in a build that cannot draw.
+/// What this machine draws with and whether that is software, or why it does not draw; `None` in a build that cannot draw.
 #[cfg(not(feature = "render"))]
-pub(crate) fn adapter() -> Option<Result<String, String>> {
+pub(crate) fn adapter() -> Option<Result<(String, bool), String>> {
     None
 }

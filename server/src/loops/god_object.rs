@@ -63,6 +63,8 @@ pub struct GodObjectStatistics {
     pub solver_fallbacks: AtomicU64,
     /// Updates in which an obstacle did not get to where its trace is.
     pub blocked_updates: AtomicU64,
+    /// Updates in which something stopped the body that gives no force.
+    pub stops_without_row: AtomicU64,
 }
 
 impl GodObjectLoop {
@@ -145,6 +147,10 @@ impl GodObjectLoop {
         add(
             &self.statistics.blocked_updates,
             u64::from(report.obstacles_blocked > 0),
+        );
+        add(
+            &self.statistics.stops_without_row,
+            u64::from(report.stopped_without_row),
         );
         self.snapshot.published = clock();
         self.god_object

@@ -50,6 +50,7 @@ impl Statistics {
             energy_from_obstacles_j: self.haptics.obstacle_work(),
             energy_generated_j: self.haptics.energy_generated(),
             obstacle_blocked_updates: self.god_object.blocked_updates.load(Ordering::Relaxed),
+            stops_without_force: self.god_object.stops_without_row.load(Ordering::Relaxed),
             solver_fallbacks: self.god_object.solver_fallbacks.load(Ordering::Relaxed),
             ..SessionReport::default()
         }

@@ -266,6 +266,11 @@ fn counts(to: &mut DescriptorEncoder<'_>, metrics: &Metrics) -> fmt::Result {
             metrics.session.penetration_checks,
         ),
         (
+            "stops_without_force",
+            "updates in which something stopped the body that gives no force",
+            metrics.session.stops_without_force,
+        ),
+        (
             "solver_fallbacks",
             "projections that the chosen solver did not certify",
             metrics.session.solver_fallbacks,

@@ -15,6 +15,7 @@ mod session;
 pub mod terminal;
 
 pub use client::ClientReport;
+pub(crate) use replay::said_of_stops;
 pub use replay::{RecordedReport, ReplayReport, WorkReport};
 pub use session::SessionReport;
 

@@ -34,6 +34,9 @@ pub struct ReplayReport {
     pub energy_generated_j: f64,
     /// Updates in which an obstacle did not get to where its trace is, because the body was squeezed or the budget spent.
     pub obstacle_blocked_updates: u64,
+    /// Updates in which something stopped the body that gives no force: a surface that is inside out.
+    #[serde(default)]
+    pub stops_without_force: u64,
     /// Largest change of the force from one row to the next, N.
     pub max_force_step_n: f64,
     /// Largest force, N.
@@ -149,6 +152,9 @@ impl fmt::Display for ReplayReport {
             Some(gap) => writeln!(f, "smallest gap        {gap:.3e} m")?,
             None => writeln!(f, "smallest gap        never near")?,
         }
+        if let Some(stops) = said_of_stops(self.stops_without_force) {
+            writeln!(f, "look at this        {stops}")?;
+        }
         writeln!(
             f,
             "largest force       {:.2} N, largest change per row {:.3} N",
@@ -160,6 +166,15 @@ impl fmt::Display for ReplayReport {
             self.kkt_max, self.solver_fallbacks, self.energy_injected_j
         )
     }
+}
+
+/// What updates say in which something stopped the body that gives no force, if there are any.
+pub(crate) fn said_of_stops(updates: u64) -> Option<String> {
+    (updates > 0).then(|| {
+        format!(
+            "in {updates} updates the body was stopped by a surface that gives no force (one that runs through itself or is inside out? `taut check` names it)"
+        )
+    })
 }
 
 /// A line on moving obstacles, where some did work or were held up.

@@ -10,7 +10,7 @@ use crate::loops::realtime::RealtimeReport;
 use crate::report::client::ClientReport;
 use crate::report::external::ExternalWrenchReport;
 use crate::report::frames::FramesReport;
-use crate::report::replay::write_obstacles;
+use crate::report::replay::{said_of_stops, write_obstacles};
 use crate::shared::timing::Bin;
 
 /// What `taut demo` and `taut serve` measured.
@@ -71,6 +71,9 @@ pub struct SessionReport {
     pub energy_generated_j: f64,
     /// Updates in which an obstacle did not get to where its trace is, because the body was squeezed or the budget spent.
     pub obstacle_blocked_updates: u64,
+    /// Updates in which something stopped the body that gives no force: a surface that is inside out.
+    #[serde(default)]
+    pub stops_without_force: u64,
     /// Projections that the chosen solver did not certify and another one answered.
     pub solver_fallbacks: u64,
     /// Samples that the monitor had no room for.
@@ -101,6 +104,7 @@ impl SessionReport {
                 self.penetrations, self.penetration_checks
             ));
         }
+        faults.extend(said_of_stops(self.stops_without_force));
         let ticks = self.haptics_period_us.count + self.deadline_misses;
         let missed = self.deadline_misses as f64 / ticks.max(1) as f64;
         if missed > NOTABLE_MISSES {
@@ -287,6 +291,7 @@ mod tests {
             ..SessionReport::default()
         };
         assert!(report.verdict().contains("good"), "{}", report.verdict());
+        report.stops_without_force = 7;
         report.deadline_misses = 200;
         report.penetrations = 1;
         report.clients = vec![ClientReport {
@@ -298,6 +303,7 @@ mod tests {
         let first = text.lines().next().unwrap_or_default();
         for part in [
             "intersected in 1",
+            "in 7 updates",
             "2.0 % of its deadlines",
             "table draws fewer",
         ] {

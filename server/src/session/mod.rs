@@ -75,6 +75,8 @@ pub struct Session {
     wrench: Subscriber<WrenchCommand>,
     arm_switch: Arc<ArmSwitch>,
     incidents: IncidentCursor,
+    /// Stops without a force that were told of, and the age from which more are.
+    stops_told: (u64, Duration),
     fidelity: Option<Fidelity>,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,

@@ -1,26 +1,31 @@
 //! What happens in a session: network, safety events and fidelity, to the log, the recording and the monitor.
 
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use taut_bridge::EventKind;
 use taut_link::{LinkEvent, ServerLink, proto};
 use taut_recording::EventRecord;
 
 use crate::loops::incidents::{self};
-use crate::report::SessionReport;
 use crate::report::external::ExternalWrenchReport;
 use crate::report::frames::FramesReport;
 use crate::report::metrics::{self, ClientLink, Metrics};
 use crate::report::terminal::Terminal;
+use crate::report::{SessionReport, said_of_stops};
 use crate::session::monitor::Severity;
 
 use super::Session;
+
+/// Time until stops without a force are told of again.
+const STOPS_PERIOD: Duration = Duration::from_secs(10);
 
 impl Session {
     /// Reports what happened on the network since the last call: errors here, everything to monitor and log. Call it a few times a
     /// second.
     pub fn follow_network(&mut self, terminal: &Terminal) {
         self.log_incidents();
+        self.log_stops();
         if let Some(fidelity) = &mut self.fidelity {
             for line in fidelity.watch.notices(&mut fidelity.reported) {
                 terminal.say(&line);
@@ -104,6 +109,31 @@ impl Session {
                     text,
                 });
             }
+        }
+    }
+
+    /// Tells of updates in which something stopped the body that gives no force; of more of them every ten seconds.
+    fn log_stops(&mut self) {
+        let stops = &self.statistics.god_object.stops_without_row;
+        let (stops, now) = (stops.load(Ordering::Relaxed), self.clock.now());
+        let (told, again) = self.stops_told;
+        if now < again {
+            return;
+        }
+        let Some(text) = said_of_stops(stops - told) else {
+            return;
+        };
+        self.stops_told = (stops, now + STOPS_PERIOD);
+        tracing::error!("{text}");
+        if let Some(page) = &mut self.operator {
+            page.note_line(now, Severity::Error, &text);
+        }
+        if let Some(recorder) = &self.recorder {
+            recorder.events().send(EventRecord {
+                time: now,
+                kind: "method".to_owned(),
+                text,
+            });
         }
     }
 

@@ -142,6 +142,7 @@ impl Session {
             wrench: loops.readers.status,
             arm_switch: loops.arm_switch.clone(),
             incidents: IncidentCursor::default(),
+            stops_told: (0, std::time::Duration::ZERO),
             fidelity,
             network: Arc::default(),
             clients: ClientLedger::default(),
@@ -255,7 +256,7 @@ fn coupling_offer(setup: &SessionSetup) -> Result<CouplingOffer, Failure> {
             offer_of(&setup.world, &setup.settings, setup.moving(), sets_hz).map_err(unencodable)
         }
         DeviceSource::Local(_) => Ok(CouplingOffer::AtServer {
-            reason: "its workbench has a device of its own".into(),
+            reason: "its workbench has a device of its own, and no other moves anything; write kind = \"remote\" in its [device] for this one".into(),
         }),
     }
 }

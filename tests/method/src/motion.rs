@@ -80,8 +80,15 @@ impl Led {
     }
 
     /// One update, then one force.
+    ///
+    /// # Panics
+    /// Something stopped the body that gives no force.
     pub fn step(&mut self, time: f64, device: &Pose) -> Sample {
         let report = self.god_object.step(device, self.shaded.as_ref());
+        assert!(
+            !report.stopped_without_row,
+            "at {time} s what stops the body gives no force"
+        );
         let set = self.god_object.constraint_set();
         let output = self.coupling.step(time, device, set);
         self.shaded = output.shaded;

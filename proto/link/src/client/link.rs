@@ -4,7 +4,7 @@ use super::{
     FrameGate, GroupReceiver, ReceivedState, ReceivedWrench, Roster, hot::Hot, meshes::Meshes,
 };
 use crate::{
-    ClientCounters, LinkError, MeshCounters, STOP_REASON,
+    CHANGE_REASON, ClientCounters, LinkError, MeshCounters, STOP_REASON,
     framing::{CLOSE_BYE, close_text, write_message},
 };
 use quinn::{Endpoint, SendStream};
@@ -32,6 +32,13 @@ pub enum SessionEnd {
     ServerStopped,
     /// For another reason, one sentence.
     Lost(String),
+}
+
+impl SessionEnd {
+    /// Whether the server said that it begins another session, as after a change of the scene: nothing is wrong, and it is joined at once.
+    pub fn is_change(&self) -> bool {
+        matches!(self, Self::Lost(reason) if reason.contains(CHANGE_REASON))
+    }
 }
 
 /// A joined session. Every method takes `&self`: share it by `Arc`. Dropping it leaves the session at once.

@@ -137,6 +137,7 @@ async fn supervise<T, P, F, E>(
         link.outlive();
         match &end {
             SessionEnd::ServerStopped => tracing::info!("the server stopped; waiting for it"),
+            change if change.is_change() => tracing::info!("the server begins another session"),
             SessionEnd::Lost(reason) => tracing::warn!("link lost: {reason}"),
         }
         let back = come_back(&mut rejoiner, &mut prepare, &slot).await;

@@ -19,7 +19,7 @@ use super::{
     shared::{MESH_BURST_BYTES, MESH_BYTES_PER_SECOND, Sessions, Shared},
 };
 use crate::{
-    Counters, LinkError, STOP_REASON, SessionClock,
+    CHANGE_REASON, Counters, LinkError, STOP_REASON, SessionClock,
     counters::CounterCells,
     framing::{CLOSE_CHANGING, CLOSE_STOPPING},
     lock::{Mutex, lock},
@@ -45,8 +45,6 @@ use tokio::time::{sleep, timeout};
 const MAX_EVENTS: usize = 1024;
 /// Time for the clients to hear that the server stops.
 const STOP_TIMEOUT: Duration = Duration::from_millis(500);
-/// What clients are told where another session begins.
-const CHANGE_REASON: &str = "the server begins another session";
 /// How often a stopped server looks whether its port is free.
 const FREE_CHECK: Duration = Duration::from_millis(1);
 

@@ -22,6 +22,9 @@ pub struct StepReport {
     pub substeps: u32,
     /// Obstacles that did not get to their targets: the body is squeezed, or the budget ran out.
     pub obstacles_blocked: u32,
+    /// The last motion was cut short at an obstacle of which the set has no row: what stops the body there gives no force. Of a surface that is closed
+    /// and looks outward this is never so.
+    pub stopped_without_row: bool,
     /// The input was not finite: nothing moved.
     pub rejected: bool,
     /// The budget or the sub-steps ran out before the motion left was below tolerance: safe, only not yet closest.
@@ -34,5 +37,9 @@ impl GodObject {
     pub(super) fn describe_set(&self, report: &mut StepReport) {
         report.contacts = self.set.constraints.len();
         report.gap_min = self.set.gap_min;
+        report.stopped_without_row = self.last_stop.is_some_and(|obstacle| {
+            let mut rows = self.set.constraints.iter();
+            rows.all(|row| usize::from(row.features.obstacle) != obstacle)
+        });
     }
 }

@@ -63,6 +63,8 @@ pub struct GodObject {
     pub(super) stopped: Option<usize>,
     /// One has in this update: there may be more pairs that no row stands for.
     pub(super) was_stopped: bool,
+    /// The obstacle that cut this update's last motion short.
+    pub(super) last_stop: Option<usize>,
     /// Distance within which the present set has every row, m.
     pub(super) collected_within: f64,
     /// Longest look-ahead that the last ones' cost allows, m.
@@ -135,6 +137,7 @@ impl GodObject {
             device_ahead: 0.0,
             stopped: None,
             was_stopped: false,
+            last_stop: None,
             collected_within: 0.0,
             affordable: settings.activation_distance + settings.look_ahead_limit,
         };
@@ -176,6 +179,7 @@ impl GodObject {
     pub fn step(&mut self, device_pose: &Pose, shaded: Option<&ShadedAcceleration>) -> StepReport {
         let mut report = StepReport::default();
         self.was_stopped = false;
+        self.last_stop = None;
         if !pose_is_finite(device_pose) {
             report.rejected = true;
             self.describe_set(&mut report);

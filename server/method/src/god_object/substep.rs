@@ -215,6 +215,7 @@ impl GodObject {
         let (time, stopped) = self.free_time(motion, |_| false, report);
         self.stopped = stopped.or(self.stopped);
         self.was_stopped |= stopped.is_some();
+        self.last_stop = stopped;
         if time > 0.0 {
             let reached = motion.pose_at(time);
             self.pose = from_reference_point(&reached, &motion.reference_point);

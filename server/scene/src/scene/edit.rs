@@ -214,8 +214,14 @@ impl Scene {
             let keys = place.keys();
             let hint = nearest(key, keys.iter().copied());
             return Err(format!(
-                "sets `{key}`, which is changed in the file alone; of \"{name}\" there can be changed while it runs: {}{hint}",
+                "sets `{key}`, which is no key that can be changed while it runs; of \"{name}\" these can: {}{hint}",
                 keys.join(", ")
+            ));
+        }
+        if let Some((_, place)) = named.clone().find(|(name, _)| *name == path) {
+            return Err(format!(
+                "names no key of \"{path}\"; write {path}.KEY=VALUE, where KEY is one of: {}",
+                place.keys().join(", ")
             ));
         }
         let wrong = path.split_once('.').map_or(path, |(name, _)| name);

@@ -254,7 +254,12 @@ fn limit_of(name: &str) -> Option<String> {
 fn rendering() -> Option<Finding> {
     const WHAT: &str = "rendering";
     Some(match crate::commands::render::adapter()? {
-        Ok(adapter) => Finding::good(WHAT, format!("draws with {adapter}")),
+        Ok((adapter, false)) => Finding::good(WHAT, format!("draws with {adapter}")),
+        Ok((adapter, true)) => Finding::lacking(
+            WHAT,
+            format!("draws with {adapter}; that is software: slow, and good for tests"),
+            "a graphics card and its driver, where this machine is to draw the screens of a workbench; else nothing",
+        ),
         Err(reason) => Finding::lacking(
             WHAT,
             reason,

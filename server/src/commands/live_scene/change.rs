@@ -120,7 +120,7 @@ pub(super) fn write_scene(file: &str, text: &str, read: &str) -> Result<(), Stri
     let there = std::fs::read(path).map_err(|error| format!("{file} cannot be read ({error})"))?;
     if there != read.as_bytes() {
         return Err(format!(
-            "{file} was changed since it was read; take that first (choose the scene anew, or serve with --follow-scene)"
+            "{file} was changed since it was read; take that first: choose the scene anew, or wait where the server follows it (--follow-scene). What is not kept goes with that"
         ));
     }
     FinishedFile::replace(path, text).map_err(|error| {

@@ -39,7 +39,7 @@ const SHORTEST_LIFE: Duration = Duration::from_secs(1);
 struct Taken {
     asked: AskedScene,
     what: String,
-    kept: bool,
+    warnings: Vec<String>,
 }
 
 /// The scene that runs.
@@ -75,6 +75,8 @@ pub(super) struct LiveScene {
     pending: Option<Pending>,
     taken: Option<Taken>,
     files: Option<SceneWatch>,
+    /// Changes that were not kept and went when the files were taken.
+    gone: Vec<String>,
 }
 
 impl LiveScene {
@@ -87,6 +89,7 @@ impl LiveScene {
             pending: None,
             taken: None,
             files: None,
+            gone: Vec::new(),
         }
     }
 
@@ -143,19 +146,29 @@ impl LiveScene {
     pub(super) fn began(&mut self, session: &Session) {
         self.loader
             .stay_at(session.quic_address(), session.udp_address());
-        let Some(Taken { asked, what, kept }) = self.taken.take() else {
+        let Some(Taken {
+            asked,
+            what,
+            warnings,
+        }) = self.taken.take()
+        else {
             return;
         };
         PageAudit::edited(asked.peer, self.revision, &what);
-        let kept = if kept {
+        let running = self.running.as_ref();
+        let in_file = if running.is_some_and(|running| running.not_kept.is_empty()) {
             "the file has it"
         } else {
             "the file does not have it"
         };
-        asked.answer(Ok(format!(
-            "taken: {what}; revision {} runs, and {kept}",
+        let mut said = format!(
+            "taken: {what}; revision {} runs, and {in_file}",
             self.revision
-        )));
+        );
+        for warning in warnings {
+            said = format!("{said}\nwarning: {warning}");
+        }
+        asked.answer(Ok(said));
     }
 
     /// What is to take the place of this session, whose loops have run for `age`, if something is.
@@ -191,16 +204,17 @@ impl LiveScene {
 
     /// Takes what the files are now.
     fn take_files(
-        &self,
+        &mut self,
         thread: JoinHandle<Result<Next, Failure>>,
         terminal: &Terminal,
     ) -> Option<Next> {
         let (files, running) = (self.files.as_ref()?, self.running.as_ref()?);
         let next = files.take(terminal, joined(thread))?;
-        if !running.not_kept.is_empty() {
+        self.gone.clone_from(&running.not_kept);
+        if !self.gone.is_empty() {
             terminal.say(&format!(
                 "what was changed while it ran, and not kept in a file, is gone: {}",
-                running.not_kept.join("; ")
+                self.gone.join("; ")
             ));
         }
         Some(next)
@@ -245,6 +259,13 @@ impl LiveScene {
             return Err(why.to_owned());
         }
         let text = running.scene.text().clone();
+        if running.not_kept.is_empty() && !self.gone.is_empty() {
+            return Err(format!(
+                "{} was changed and taken since, and what was not kept before went with that ({}); set it again",
+                running.from,
+                self.gone.join("; ")
+            ));
+        }
         write_scene(&running.from, &text, &running.in_file)?;
         running.not_kept.clear();
         running.in_file = text;
@@ -286,11 +307,16 @@ impl LiveScene {
                     "an operator changes the scene ({}): the force fades, and another session begins",
                     change.what
                 ));
-                let (what, kept, mut next) = (change.what, change.keep, change.next);
-                if kept {
+                let mut next = change.next;
+                if change.keep {
                     next.in_file = next.setup.scene.text().clone();
                 }
-                self.taken = Some(Taken { asked, what, kept });
+                self.gone.clear();
+                self.taken = Some(Taken {
+                    asked,
+                    what: change.what,
+                    warnings: next.setup.warnings.clone(),
+                });
                 Some(next)
             }
             Err(why) => {

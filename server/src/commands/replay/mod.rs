@@ -271,6 +271,7 @@ impl Measured {
         self.update_us.push(microseconds(took));
         self.report.solver_fallbacks += u64::from(step.solver_fallbacks);
         self.report.obstacle_blocked_updates += u64::from(step.obstacles_blocked > 0);
+        self.report.stops_without_force += u64::from(step.stopped_without_row);
         let work = &mut self.report.work;
         *work = WorkReport {
             node_pairs: work.node_pairs + step.work.node_pairs,

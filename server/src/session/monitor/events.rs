@@ -1,4 +1,4 @@
-//! What happens in a session, as lines for the monitor's log: contacts, safety events, device faults, penetrations.
+//! What happens in a session, as lines for the monitor's log: contacts, safety events, device faults, penetrations, stops without a force.
 //!
 //! Found by comparing the shared data with what it was at the last look, on the monitor's thread: the loops know nothing of it.
 //! A contact shorter than the time between two looks goes unseen.
@@ -11,6 +11,7 @@ use taut_bridge::EventKind;
 use super::Severity;
 use crate::loops::incidents::line;
 use crate::loops::statistics::Statistics;
+use crate::report::said_of_stops;
 use crate::shared::contact_snapshot::ContactSnapshot;
 
 /// A contact begins when the gap is at most this many rest distances, and ends when it is more than the second number of them.
@@ -29,6 +30,7 @@ pub(super) struct EventLog {
     contact_lines: ContactLines,
     incidents: [Repeated; EventKind::ALL.len()],
     penetrations: Repeated,
+    stops: Repeated,
 }
 
 #[derive(Debug)]
@@ -81,6 +83,7 @@ impl EventLog {
             contact_lines: ContactLines::default(),
             incidents: Default::default(),
             penetrations: Repeated::default(),
+            stops: Repeated::default(),
         }
     }
 
@@ -118,6 +121,11 @@ impl EventLog {
                     "penetration: the god-object intersected \"{obstacle}\" first, {count} checked poses do by now"
                 ),
             );
+        }
+        let stops = &statistics.god_object.stops_without_row;
+        let growth = self.stops.growth(now, stops.load(Ordering::Relaxed));
+        if let Some(stops) = growth.and_then(said_of_stops) {
+            say(Severity::Error, &stops);
         }
     }
 
@@ -290,5 +298,11 @@ mod tests {
             Some(Severity::Error)
         );
         assert_eq!(watched.look(3000, 1.0), [""; 0]);
+
+        let stops = watched.statistics.god_object.clone();
+        stops.stops_without_row.store(4, Ordering::Relaxed);
+        let lines = watched.look(4100, 1.0);
+        assert!(lines[0].contains("in 4 updates"), "{lines:?}");
+        assert_eq!(watched.look(6000, 1.0), [""; 0]);
     }
 }

@@ -33,6 +33,8 @@ use crate::session::operator::OperatorSetup;
 pub struct SessionSetup {
     /// As it was read.
     pub scene: Scene,
+    /// What is to be known of scene and device together, a sentence each; logged already.
+    pub warnings: Vec<String>,
     /// Bodies.
     pub world: Arc<World>,
     /// How obstacles move; nothing for those that stand still. At most

@@ -88,7 +88,7 @@ pub fn session_setup(
     let declared = dynamics_of(workbench, overrides, choice.as_ref(), &built)?;
     let mut warnings = borne(declared, &built, overrides.allow_unstable)?;
     warnings.extend(where_coupled(&built, workbench, overrides)?);
-    for warning in warnings {
+    for warning in &warnings {
         tracing::warn!("{warning}");
     }
     let workbench_from_scene = workbench.workbench_from_scene(&scene);
@@ -133,6 +133,7 @@ pub fn session_setup(
     }
     Ok(SessionSetup {
         scene,
+        warnings,
         fidelity,
         recording,
         device: match &choice {
