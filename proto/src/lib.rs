@@ -101,7 +101,7 @@ pub use head::HeadSample;
 pub use header::{Header, Kind};
 pub use input::InputSample;
 pub use key::ClusterKey;
-pub use mesh_blob::{Finish, MeshBlob, MeshHash};
+pub use mesh_blob::{Finish, Look, Looks, MeshBlob, MeshHash};
 pub use panorama::Panorama;
 pub use pin::ServerPin;
 pub use pose::{PoseF32, PoseF64};

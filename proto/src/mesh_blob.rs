@@ -3,7 +3,7 @@
 //! | offset | field     | bytes              | meaning                                      |
 //! |--------|-----------|--------------------|----------------------------------------------|
 //! | 0      | magic     | 4                  | "tmsh"                                       |
-//! | 4      | layout    | 1                  | bit 0: f64 vertices, bit 1: normals, bit 2: finish |
+//! | 4      | layout    | 1                  | bit 0: f64 vertices, bit 1: normals, bit 2: finish, bit 3: looks |
 //! | 5      | reserved  | 3                  | 0                                            |
 //! | 8      | vertices  | 4                  | count n                                      |
 //! | 12     | triangles | 4                  | count m                                      |
@@ -11,6 +11,7 @@
 //! |        | triangles | m × 12             | vertex indices, counter-clockwise from outside |
 //! |        | normals   | n × 12 or 0        | unit, per vertex                             |
 //! |        | finish    | 8 or 0             | roughness, metallic: 0 to 1                  |
+//! |        | looks     | 4 + k × 20 + m or 0 | count k from 1 to 255; of each red, green, blue (linear), roughness, metallic: 0 to 1; of each triangle, which |
 
 use crate::{DecodeError, EncodeError, codec::wire_struct};
 
@@ -22,7 +23,11 @@ const PREFIX_BYTES: usize = 16;
 const LAYOUT_F64: u8 = 1;
 const LAYOUT_NORMALS: u8 = 2;
 const LAYOUT_FINISH: u8 = 4;
+const LAYOUT_LOOKS: u8 = 8;
 const FINISH_BYTES: usize = 8;
+const LOOK_BYTES: usize = 20;
+/// Most looks of one mesh.
+pub const MAX_LOOKS: usize = 255;
 
 wire_struct! {
     /// BLAKE3 hash of an encoded mesh.
@@ -74,6 +79,37 @@ pub struct Finish {
     pub metallic: f32,
 }
 
+/// How some of a body's triangles look, in the same terms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Linear red, green and blue.
+    pub colour: [f32; 3],
+    /// How they reflect.
+    pub finish: Finish,
+}
+
+/// Looks of a mesh whose triangles do not all look alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Looks {
+    /// At most [`MAX_LOOKS`], and one at least.
+    pub list: Vec<Look>,
+    /// Place in the list, for each triangle.
+    pub of_triangles: Vec<u8>,
+}
+
+impl Look {
+    fn numbers(&self) -> [f32; 5] {
+        let [red, green, blue] = self.colour;
+        [
+            red,
+            green,
+            blue,
+            self.finish.roughness,
+            self.finish.metallic,
+        ]
+    }
+}
+
 /// A triangle mesh. Every index is below the number of vertices, every number finite: checked when made or decoded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshBlob {
@@ -81,6 +117,7 @@ pub struct MeshBlob {
     triangles: Vec<[u32; 3]>,
     normals: Option<Vec<[f32; 3]>>,
     finish: Option<Finish>,
+    looks: Option<Looks>,
 }
 
 impl Positions {
@@ -135,6 +172,7 @@ impl MeshBlob {
             triangles,
             normals,
             finish: None,
+            looks: None,
         })
     }
 
@@ -148,6 +186,27 @@ impl MeshBlob {
             });
         }
         self.finish = Some(finish);
+        Ok(self)
+    }
+
+    /// The same mesh with looks of its triangles, which count instead of the body's colour and finish; their numbers are 0 to 1.
+    pub fn with_looks(mut self, looks: Looks) -> Result<MeshBlob, DecodeError> {
+        let count = looks.list.len();
+        let known = |place: &u8| usize::from(*place) < count;
+        if !(1..=MAX_LOOKS).contains(&count)
+            || looks.of_triangles.len() != self.triangles.len()
+            || !looks.of_triangles.iter().all(known)
+        {
+            return Err(DecodeError::Inconsistent { what: "mesh looks" });
+        }
+        let mut numbers = looks.list.iter().flat_map(Look::numbers);
+        if !numbers.all(|number| (0.0..=1.0).contains(&number)) {
+            return Err(DecodeError::OutOfRange {
+                number: "MeshBlob.looks",
+                range: "0 to 1",
+            });
+        }
+        self.looks = Some(looks);
         Ok(self)
     }
 
@@ -179,6 +238,11 @@ impl MeshBlob {
         self.finish
     }
 
+    /// Looks of its triangles; `None` is the body's colour, and its finish.
+    pub fn looks(&self) -> Option<&Looks> {
+        self.looks.as_ref()
+    }
+
     /// The bytes that travel and are hashed. Fails above [`MAX_MESH_BYTES`].
     pub fn encode(&self) -> Result<Vec<u8>, EncodeError> {
         let vertices = self.positions.len();
@@ -196,10 +260,18 @@ impl MeshBlob {
             Some(_) => (LAYOUT_FINISH, FINISH_BYTES),
             None => (0, 0),
         };
+        let (looks, look_bytes) = match &self.looks {
+            Some(looks) => (
+                LAYOUT_LOOKS,
+                4 + LOOK_BYTES * looks.list.len() + looks.of_triangles.len(),
+            ),
+            None => (0, 0),
+        };
         let len = PREFIX_BYTES
             + vertices * (position_bytes + normal_bytes)
             + self.triangles.len() * 12
-            + finish_bytes;
+            + finish_bytes
+            + look_bytes;
         if len > MAX_MESH_BYTES {
             return Err(EncodeError::TooLong {
                 what: "mesh",
@@ -209,7 +281,7 @@ impl MeshBlob {
         }
         let mut bytes = Vec::with_capacity(len);
         bytes.extend(BLOB_MAGIC);
-        bytes.extend([wide | normals | finish, 0, 0, 0]);
+        bytes.extend([wide | normals | finish | looks, 0, 0, 0]);
         bytes.extend((vertices as u32).to_le_bytes()); // far below 2^32: see the limit above
         bytes.extend((self.triangles.len() as u32).to_le_bytes());
         match &self.positions {
@@ -235,6 +307,12 @@ impl MeshBlob {
             .iter()
             .flat_map(|finish| [finish.roughness, finish.metallic])
             .for_each(|x| bytes.extend(x.to_le_bytes()));
+        if let Some(looks) = &self.looks {
+            bytes.extend((looks.list.len() as u32).to_le_bytes()); // at most MAX_LOOKS
+            let numbers = looks.list.iter().flat_map(Look::numbers);
+            bytes.extend(numbers.flat_map(f32::to_le_bytes));
+            bytes.extend(&looks.of_triangles);
+        }
         Ok(bytes)
     }
 
@@ -264,7 +342,8 @@ impl MeshBlob {
         if [m0, m1, m2, m3] != BLOB_MAGIC {
             return Err(DecodeError::WrongMagic);
         }
-        if layout & !(LAYOUT_F64 | LAYOUT_NORMALS | LAYOUT_FINISH) != 0 || [r0, r1, r2] != [0; 3] {
+        let known = LAYOUT_F64 | LAYOUT_NORMALS | LAYOUT_FINISH | LAYOUT_LOOKS;
+        if layout & !known != 0 || [r0, r1, r2] != [0; 3] {
             return Err(DecodeError::UnknownTag {
                 what: "mesh layout",
                 tag: layout,
@@ -281,15 +360,22 @@ impl MeshBlob {
         let triangle_len = triangles * 12;
         let normal_len = if with_normals { vertices * 12 } else { 0 };
         let finish_len = if with_finish { FINISH_BYTES as u64 } else { 0 };
-        if position_len + triangle_len + normal_len + finish_len != body.len() as u64 {
-            return Err(DecodeError::Inconsistent {
-                what: "mesh length",
-            });
-        }
+        let before_looks = position_len + triangle_len + normal_len + finish_len;
+        let looks_start = usize::try_from(before_looks).unwrap_or(usize::MAX);
+        let (body, looks) = match body.split_at_checked(looks_start) {
+            Some((body, looks)) if (layout & LAYOUT_LOOKS != 0) != looks.is_empty() => {
+                (body, looks)
+            }
+            _ => {
+                return Err(DecodeError::Inconsistent {
+                    what: "mesh length",
+                });
+            }
+        };
         let (positions, rest) = body.split_at(position_len as usize);
         let (triangles, rest) = rest.split_at(triangle_len as usize);
         let (normals, finish) = rest.split_at(normal_len as usize);
-        let mesh = MeshBlob::new(
+        let mut mesh = MeshBlob::new(
             if wide {
                 Positions::F64(triples(positions, f64::from_le_bytes))
             } else {
@@ -298,14 +384,46 @@ impl MeshBlob {
             triples(triangles, u32::from_le_bytes),
             with_normals.then(|| triples(normals, f32::from_le_bytes)),
         )?;
-        let Ok([a, b, c, d, e, f, g, h]) = <[u8; FINISH_BYTES]>::try_from(finish) else {
-            return Ok(mesh); // none: the lengths above agree
-        };
-        mesh.with_finish(Finish {
-            roughness: f32::from_le_bytes([a, b, c, d]),
-            metallic: f32::from_le_bytes([e, f, g, h]),
-        })
+        // Where there are none, the bytes are none: the lengths above agree.
+        if let Ok([a, b, c, d, e, f, g, h]) = <[u8; FINISH_BYTES]>::try_from(finish) {
+            mesh = mesh.with_finish(Finish {
+                roughness: f32::from_le_bytes([a, b, c, d]),
+                metallic: f32::from_le_bytes([e, f, g, h]),
+            })?;
+        }
+        match looks {
+            [] => Ok(mesh),
+            looks => mesh.with_looks(looks_of(looks)?),
+        }
     }
+}
+
+/// Looks out of their bytes; the places of the triangles are whatever follows the list.
+fn looks_of(bytes: &[u8]) -> Result<Looks, DecodeError> {
+    let Some((count, rest)) = bytes.split_first_chunk::<4>() else {
+        return Err(DecodeError::Truncated);
+    };
+    let count = u32::from_le_bytes(*count) as usize;
+    let list = LOOK_BYTES.checked_mul(count);
+    let Some((list, of_triangles)) = list.and_then(|length| rest.split_at_checked(length)) else {
+        return Err(DecodeError::Truncated);
+    };
+    let (numbers, _) = list.as_chunks::<4>();
+    let (looks, _) = numbers.as_chunks::<5>();
+    let look = |numbers: &[[u8; 4]; 5]| {
+        let [red, green, blue, roughness, metallic] = numbers.map(f32::from_le_bytes);
+        Look {
+            colour: [red, green, blue],
+            finish: Finish {
+                roughness,
+                metallic,
+            },
+        }
+    };
+    Ok(Looks {
+        list: looks.iter().map(look).collect(),
+        of_triangles: of_triangles.to_vec(),
+    })
 }
 
 /// Numbers of `N` bytes, three by three; `bytes` is a whole number of triples.

@@ -3,8 +3,8 @@
 use crate::samples::*;
 use proptest::prelude::*;
 use taut_proto::{
-    ClientStats, ControlMessage, DecodeError, EncodeError, Finish, HotState, Kind, MeshBlob,
-    PROTOCOL_VERSION, Payload, Refusal, SceneDescription, Untrusted, VersionRange,
+    ClientStats, ControlMessage, DecodeError, EncodeError, Finish, HotState, Kind, Look, Looks,
+    MeshBlob, PROTOCOL_VERSION, Payload, Refusal, SceneDescription, Untrusted, VersionRange,
     codec::{MAX_LIST, MAX_TEXT_BYTES, decode, encode_onto},
     control::{Bye, LENGTH_BYTES, MAX_FRAME_BYTES, RefusalCode},
     header::MAX_PAYLOAD_BYTES,
@@ -224,7 +224,7 @@ fn tetrahedron() -> MeshBlob {
 }
 
 #[test]
-fn a_mesh_comes_back_in_both_precisions_with_and_without_normals_and_finish() {
+fn a_mesh_comes_back_in_both_precisions_with_and_without_all_its_parts() {
     let double = tetrahedron();
     let single = |p: [f64; 3]| p.map(|x| x as f32);
     let singles = double.positions_f64().into_iter().map(single).collect();
@@ -234,12 +234,73 @@ fn a_mesh_comes_back_in_both_precisions_with_and_without_normals_and_finish() {
                 .unwrap_or_else(|error| panic!("{error}"));
             let finished = mesh.clone().with_finish(FINISH);
             let finished = finished.unwrap_or_else(|error| panic!("{error}"));
-            for mesh in [mesh, finished] {
+            let looks = Looks {
+                list: vec![look(0.25), look(1.0)],
+                of_triangles: vec![0, 1, 1, 0],
+            };
+            let [patched, both] = [&mesh, &finished].map(|mesh| {
+                let mesh = mesh.clone().with_looks(looks.clone());
+                mesh.unwrap_or_else(|error| panic!("{error}"))
+            });
+            for mesh in [mesh, finished, patched, both] {
                 let bytes = mesh.encode().unwrap_or_else(|error| panic!("{error}"));
                 assert_eq!(MeshBlob::decode(&bytes), Ok(mesh));
             }
         }
     }
+}
+
+fn look(red: f32) -> Look {
+    Look {
+        colour: [red, 0.5, 0.0],
+        finish: FINISH,
+    }
+}
+
+#[test]
+fn looks_that_are_not_of_the_mesh_are_refused() {
+    let with = |list: Vec<Look>, of_triangles: Vec<u8>| {
+        tetrahedron().with_looks(Looks { list, of_triangles })
+    };
+    let inconsistent = Err(DecodeError::Inconsistent { what: "mesh looks" });
+    assert_eq!(with(vec![], vec![]), inconsistent, "no look");
+    assert_eq!(
+        with(vec![], vec![0; 4]),
+        inconsistent,
+        "no look of those named"
+    );
+    assert_eq!(
+        with(vec![look(1.0)], vec![0; 3]),
+        inconsistent,
+        "a triangle without"
+    );
+    assert_eq!(
+        with(vec![look(1.0)], vec![0, 1, 0, 0]),
+        inconsistent,
+        "no second"
+    );
+    assert_eq!(
+        with(vec![look(1.0); 256], vec![0; 4]),
+        inconsistent,
+        "too many"
+    );
+    for red in [-0.01, 1.01, f32::NAN] {
+        assert!(with(vec![look(red)], vec![0; 4]).is_err(), "{red}");
+    }
+    let good = with(vec![look(1.0); 255], vec![0, 254, 0, 0]);
+    let bytes = good.and_then(|mesh| Ok(mesh.encode().unwrap_or_default()));
+    let bytes = bytes.unwrap_or_default();
+    for length in 0..bytes.len() {
+        let cut = MeshBlob::decode(&bytes[..length]);
+        assert!(cut.is_err(), "cut to {length}");
+    }
+    let mut longer = bytes.clone();
+    longer.push(0);
+    assert!(MeshBlob::decode(&longer).is_err());
+    let mut other = bytes;
+    let last = other.len() - 1;
+    other[last] = 255;
+    assert_eq!(MeshBlob::decode(&other), inconsistent);
 }
 
 const FINISH: Finish = Finish {

@@ -6,7 +6,7 @@
 
 use crate::samples::*;
 use taut_proto::{
-    Finish, MeshBlob, Panorama,
+    Finish, Look, Looks, MeshBlob, Panorama,
     header::MAX_DATAGRAM_BYTES,
     mesh_blob::{MeshHash, Positions},
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
@@ -53,6 +53,19 @@ fn made() -> Vec<(String, String)> {
     let finished = finished.unwrap_or_else(|error| panic!("{error}"));
     let blob = finished.encode().unwrap_or_else(|error| panic!("{error}"));
     lines.push(("mesh/triangle-with-finish".to_owned(), hex(&blob)));
+    let patched = mesh().with_looks(Looks {
+        list: vec![Look {
+            colour: [1.0, 0.5, 0.0],
+            finish: Finish {
+                roughness: 0.25,
+                metallic: 1.0,
+            },
+        }],
+        of_triangles: vec![0],
+    });
+    let patched = patched.unwrap_or_else(|error| panic!("{error}"));
+    let blob = patched.encode().unwrap_or_else(|error| panic!("{error}"));
+    lines.push(("mesh/triangle-with-looks".to_owned(), hex(&blob)));
     let panorama = Panorama::from_fn(|column, row| [column as f32, row as f32, 0.5]).encode();
     lines.push((
         "panorama/hash".to_owned(),

@@ -156,5 +156,6 @@ fn scattered(mesh: &TriangleMesh) -> TriangleMesh {
     TriangleMesh {
         vertices,
         triangles,
+        looks: None,
     }
 }

@@ -6,7 +6,7 @@ struct Instance {
     @location(4) model_z: vec4<f32>,
     @location(5) model_w: vec4<f32>,
     @location(6) colour: vec4<f32>,
-    @location(7) finish: vec4<f32>,  // x roughness, y own light, z share of a metal
+    @location(7) finish: vec4<f32>,  // x roughness, y own light, z share of a metal, w looks of triangles count
 }
 
 struct Fragment {
@@ -26,7 +26,13 @@ fn unfolded(place: vec2<f32>) -> vec3<f32> {
 }
 
 @vertex
-fn vertex(@location(0) position: vec3<f32>, @location(1) folded: vec2<f32>, instance: Instance) -> Fragment {
+fn vertex(
+    @location(0) position: vec3<f32>,
+    @location(1) folded: vec2<f32>,
+    @location(8) look_colour: vec4<f32>,
+    @location(9) look_finish: vec4<f32>,
+    instance: Instance,
+) -> Fragment {
     let normal = unfolded(folded); // its length does not matter
     let model = mat4x4(instance.model_x, instance.model_y, instance.model_z, instance.model_w);
     let place = model * vec4(position, 1.0);
@@ -40,8 +46,11 @@ fn vertex(@location(0) position: vec3<f32>, @location(1) folded: vec2<f32>, inst
     fragment.clip = frame.clip_from_workbench * place;
     fragment.position = place.xyz;
     fragment.normal = (model * vec4(normal / squares, 0.0)).xyz;
-    fragment.colour = instance.colour;
-    fragment.finish = instance.finish;
+    // Of all three corners of a triangle the same.
+    let has_look = instance.finish.w > 0.5 && look_colour.w > 0.5;
+    fragment.colour = vec4(select(instance.colour.rgb, look_colour.rgb * look_colour.rgb, has_look), instance.colour.a);
+    let finish = vec4(look_finish.x, instance.finish.y, look_finish.y, instance.finish.w);
+    fragment.finish = select(instance.finish, finish, has_look);
     return fragment;
 }
 

@@ -238,6 +238,7 @@ fn mesh_of(blob: &MeshBlob) -> (TriangleMesh, Point3<f64>) {
     let mesh = TriangleMesh {
         vertices: positions.into_iter().map(near).collect(),
         triangles: blob.triangles().to_vec(),
+        looks: blob.looks().cloned(),
     };
     (mesh, origin)
 }

@@ -60,12 +60,14 @@ impl Level {
 impl Detail {
     /// The levels of a mesh.
     pub fn of(shaded: &Shaded) -> Self {
-        let Shaded { vertices, indices } = shaded;
+        let Shaded {
+            vertices, indices, ..
+        } = shaded;
         let mut all = Self {
             indices: indices.clone(),
             levels: vec![Level::whole(shaded)],
         };
-        let flat: Vec<[[f32; 3]; 2]> = vertices.iter().map(|&(p, n)| [p, n]).collect();
+        let flat: Vec<[[f32; 3]; 2]> = vertices.iter().map(|&(p, n, _)| [p, n]).collect();
         let stride = size_of::<[[f32; 3]; 2]>();
         let Ok(places) = VertexDataAdapter::new(bytemuck::cast_slice(&flat), stride, 0) else {
             return all; // vertices of a whole number of bytes each are always taken

@@ -9,6 +9,7 @@
 use std::collections::HashMap;
 
 use nalgebra::Vector3;
+use taut_proto::Look;
 
 use crate::stage::TriangleMesh;
 
@@ -19,20 +20,36 @@ pub const CREASE_DEGREES: f32 = 35.0;
 /// Vertices with normals, and the triangles over them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shaded {
-    /// Position and unit normal.
-    pub vertices: Vec<([f32; 3], [f32; 3])>,
+    /// Position, unit normal and look: a place in `looks`, or [`NO_LOOK`].
+    pub vertices: Vec<([f32; 3], [f32; 3], u32)>,
     /// Three places in `vertices` per triangle.
     pub indices: Vec<u32>,
+    /// How vertices look that do not look as the body does.
+    pub looks: Vec<Look>,
 }
 
-/// The mesh with a normal at every corner; vertices are doubled along creases only.
+/// Of a vertex that looks as its body does.
+pub const NO_LOOK: u32 = u32::MAX;
+
+/// The mesh with a normal at every corner; vertices are doubled along creases and between looks only.
 ///
 /// Triangles that name a vertex that is not there are left out.
 pub fn shade(mesh: &TriangleMesh) -> Shaded {
     let welded = weld(mesh);
     let corner = |index: u32| Vector3::from(mesh.vertices[index as usize]);
     let known = |t: &&[u32; 3]| t.iter().all(|&i| (i as usize) < mesh.vertices.len());
-    let triangles: Vec<[u32; 3]> = mesh.triangles.iter().filter(known).copied().collect();
+    let look_of = |triangle: usize| {
+        let looks = mesh.looks.as_ref();
+        let place = looks.and_then(|looks| looks.of_triangles.get(triangle));
+        place.map_or(NO_LOOK, |place| u32::from(*place))
+    };
+    let (triangles, looks): (Vec<[u32; 3]>, Vec<u32>) = mesh
+        .triangles
+        .iter()
+        .enumerate()
+        .filter(|(_, triangle)| known(triangle))
+        .map(|(place, triangle)| (*triangle, look_of(place)))
+        .unzip();
     let faces: Vec<Vector3<f32>> = triangles
         .iter()
         .map(|&[a, b, c]| direction((corner(b) - corner(a)).cross(&(corner(c) - corner(a)))))
@@ -51,8 +68,13 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
     let mut shaded = Shaded {
         vertices: Vec::with_capacity(mesh.vertices.len()),
         indices: Vec::with_capacity(3 * triangles.len()),
+        looks: mesh
+            .looks
+            .iter()
+            .flat_map(|looks| looks.list.clone())
+            .collect(),
     };
-    for (triangle, own) in triangles.iter().zip(&faces) {
+    for ((triangle, own), look) in triangles.iter().zip(&faces).zip(looks) {
         for &vertex in triangle {
             let place = welded[vertex as usize];
             let sum = around
@@ -68,12 +90,16 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
             }
             .into();
             let mut index = newest[place as usize];
-            while index != NONE && shaded.vertices[index as usize].1 != normal {
+            let differs = |index: u32| {
+                let (_, other, of) = shaded.vertices[index as usize];
+                other != normal || of != look
+            };
+            while index != NONE && differs(index) {
                 index = before[index as usize];
             }
             if index == NONE {
                 index = shaded.vertices.len() as u32;
-                let vertex = (mesh.vertices[place as usize], normal);
+                let vertex = (mesh.vertices[place as usize], normal, look);
                 shaded.vertices.push(vertex);
                 before.push(std::mem::replace(&mut newest[place as usize], index));
             }
@@ -90,11 +116,16 @@ impl Shaded {
         let Self {
             mut vertices,
             indices,
+            looks,
         } = self;
         let mut indices = meshopt::optimize_vertex_cache(&indices, vertices.len());
         let used = meshopt::optimize_vertex_fetch_in_place(&mut indices, &mut vertices);
         vertices.truncate(used);
-        Self { vertices, indices }
+        Self {
+            vertices,
+            indices,
+            looks,
+        }
     }
 }
 
@@ -161,7 +192,7 @@ mod tests {
     fn a_cylinder_of_72_facets_is_round_around_and_sharp_at_its_ends() {
         let shaded = shade(&shapes::cylinder(0.01, 0.03, 72));
         let half_facet = (2.5f32).to_radians();
-        for (position, normal) in &shaded.vertices {
+        for (position, normal, _) in &shaded.vertices {
             let on_side = normal[1].abs() < 0.5;
             if on_side {
                 let radial = Vector3::new(position[0], 0.0, position[2]).normalize();
@@ -176,7 +207,7 @@ mod tests {
     fn a_box_has_three_normals_at_each_corner() {
         let shaded = shade(&shapes::cuboid([1.0, 2.0, 3.0]));
         assert_eq!(shaded.vertices.len(), 24);
-        for (_, normal) in &shaded.vertices {
+        for (_, normal, _) in &shaded.vertices {
             assert_eq!(normal.iter().filter(|x| x.abs() == 1.0).count(), 1);
         }
     }
@@ -194,8 +225,9 @@ mod tests {
             triangles: (0..mesh.triangles.len() as u32)
                 .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
                 .collect(),
+            looks: None,
         };
-        for (position, normal) in &shade(&loose).vertices {
+        for (position, normal, _) in &shade(&loose).vertices {
             assert!(Vector3::from(*position).dot(&Vector3::from(*normal)) > 0.99);
         }
     }
@@ -203,7 +235,7 @@ mod tests {
     /// Corners of all triangles, each triangle from its least corner on.
     fn corners(shaded: &Shaded) -> Vec<[[u32; 6]; 3]> {
         let corner = |i: &u32| {
-            let ([a, b, c], [d, e, f]) = shaded.vertices[*i as usize];
+            let ([a, b, c], [d, e, f], _) = shaded.vertices[*i as usize];
             [a, b, c, d, e, f].map(f32::to_bits)
         };
         let triangle = |t: &[u32]| {
@@ -251,6 +283,7 @@ mod tests {
             let mesh = TriangleMesh {
                 vertices,
                 triangles: vec![],
+                looks: None,
             };
             assert_eq!(shade(&mesh).in_drawing_order(), shade(&mesh));
         }
@@ -261,6 +294,7 @@ mod tests {
         let mesh = TriangleMesh {
             vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             triangles: vec![[0, 1, 2], [0, 1, 9]],
+            looks: None,
         };
         assert_eq!(shade(&mesh).indices.len(), 3);
     }

@@ -7,8 +7,8 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Similarity3};
-use taut_proto::Finish;
 use taut_proto::scene::Stereo;
+use taut_proto::{Finish, Looks};
 
 use crate::calibration::Chart;
 use crate::comfort::Comfort;
@@ -82,12 +82,14 @@ pub struct StageBody {
 }
 
 /// Vertices and triangles, counter-clockwise seen from outside.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
     /// In metres, body frame.
     pub vertices: Vec<[f32; 3]>,
     /// Three places in `vertices` each.
     pub triangles: Vec<[u32; 3]>,
+    /// How triangles look that do not look as the body does.
+    pub looks: Option<Looks>,
 }
 
 /// A sphere around something.

@@ -23,6 +23,7 @@ fn globe(rings: u32, place: impl Fn(f32, f32) -> [f32; 3]) -> TriangleMesh {
     let mut mesh = TriangleMesh {
         vertices: Vec::new(),
         triangles: Vec::new(),
+        looks: None,
     };
     for ring in 0..=rings {
         let latitude = PI * (ring as f32 / rings as f32 - 0.5);
@@ -109,7 +110,7 @@ fn meshes() -> Vec<(&'static str, TriangleMesh)> {
 }
 
 fn solid(shaded: &Shaded, indices: &[u32]) -> TriMesh {
-    let place = |([x, y, z], _): &([f32; 3], [f32; 3])| {
+    let place = |([x, y, z], ..): &([f32; 3], [f32; 3], u32)| {
         Vector::new(f64::from(*x), f64::from(*y), f64::from(*z))
     };
     let triangles = indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);

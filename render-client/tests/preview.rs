@@ -6,7 +6,7 @@ use image::RgbaImage;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use taut_proto::mesh_blob::Positions;
 use taut_proto::scene::BodyDescription;
-use taut_proto::{Finish, MeshBlob, MeshHash, PoseF64};
+use taut_proto::{Finish, Look, Looks, MeshBlob, MeshHash, PoseF64};
 use taut_render::preview::{Preview, PreviewScene};
 use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::TriangleMesh;
@@ -254,6 +254,46 @@ fn one_sees_through_a_translucent_body_and_not_through_an_opaque_one() {
         // Of the farther ball a rim is seen beside the nearer one.
         assert!(3 * count(&opaque, &is_green) < green);
     }
+}
+
+#[test]
+fn triangles_of_one_body_look_as_each_is_said_to() {
+    let ball = shapes::sphere(1.0, 48);
+    let right = |triangle: &[u32; 3]| {
+        let middle: f32 = triangle.iter().map(|v| ball.vertices[*v as usize][0]).sum();
+        u8::from(middle > 0.0)
+    };
+    let look = |colour: [f32; 3]| Look {
+        colour,
+        finish: Finish {
+            roughness: 1.0,
+            metallic: 0.0,
+        },
+    };
+    let looks = Looks {
+        list: vec![look([0.6, 0.0, 0.0]), look([0.0, 0.6, 0.0])],
+        of_triangles: ball.triangles.iter().map(right).collect(),
+    };
+    let mesh = blob(&ball, 0.05, [0.0; 3]).with_looks(looks);
+    // The body's own colour is blue, and nobody sees it.
+    let held = body(
+        "held",
+        mesh.expect("of the mesh"),
+        [0.0; 3],
+        [0.0, 0.0, 1.0, 1.0],
+    );
+    let Some(pictures) = draw(&scene(vec![held]), 1) else {
+        return;
+    };
+    let (red, reds) = around(&pictures[0], is_red);
+    let (green, greens) = around(&pictures[0], is_green);
+    let is_blue = |[red, green, blue, _]: &[u8; 4]| {
+        *blue > 40 && u16::from(*blue) > 2 * u16::from(*red.max(green))
+    };
+    assert_eq!(around(&pictures[0], is_blue).1, 0);
+    assert!(reds > 2000 && greens > 2000, "{reds} {greens}");
+    // Each on its side, with a sharp border: seen from the right of the front, red on the left.
+    assert!(red[0] < green[0] && red[2] < green[2], "{red:?} {green:?}");
 }
 
 #[test]

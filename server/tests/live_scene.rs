@@ -277,7 +277,7 @@ fn what_cannot_be_taken_changes_nothing_and_says_why() {
         ("plate=2", "write plate.KEY=VALUE"),
         ("limits.force=1000", "no \"limits\""),
         ("plate.surface.friction=0.2", "already"),
-        ("plate.shape.mesh=/etc/passwd", "in the file alone"),
+        ("plate.shape.mesh=/etc/passwd", "no key that can be changed"),
     ] {
         let (status, said) = served.edit(&json!({ "edits": [edit], "keep": true }));
         assert_eq!(status, 409, "{edit}: {said}");
@@ -430,7 +430,10 @@ fn of_two_editors_the_later_one_builds_upon_the_first_or_hears_that_it_was_faste
         code == Some(0) && said.contains("revision 3 runs"),
         "{said}"
     );
-    assert!(said.contains("\nwarning: ") && said.contains("lets go"), "{said}");
+    assert!(
+        said.contains("\nwarning: ") && said.contains("lets go"),
+        "{said}"
+    );
     let scene = served.scene();
     assert_eq!(scene["scene"]["objects"][1]["friction"].to_string(), first);
     assert_eq!(scene["scene"]["objects"][1]["color"], "#30c030");

@@ -20,6 +20,7 @@ const MATERIAL: Material = Material {
         metallic: 0.0,
     },
     own_light: 0.35,
+    by_triangle: false,
 };
 
 /// A dot per contact; `radius` is that of the god-object in the workbench, in metres.

@@ -28,6 +28,7 @@ const MATERIAL: Material = Material {
         metallic: 0.0,
     },
     own_light: 0.25,
+    by_triangle: false,
 };
 
 /// The arrow for `force` (newtons, scene axes) on the god-object at `pose` (scene frame), whose

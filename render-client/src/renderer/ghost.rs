@@ -15,6 +15,7 @@ const MATERIAL: Material = Material {
         metallic: 0.0,
     },
     own_light: 0.0,
+    by_triangle: false,
 };
 
 /// The ghost at the device's pose, scene frame.

@@ -2,20 +2,24 @@
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Matrix4;
-use taut_proto::Finish;
+use taut_proto::{Finish, Look};
 
 use super::resources::filled;
 use crate::detail::{Detail, Level, coarsest};
 use crate::normals::Shaded;
 use crate::stage::{Bounds, StageBody};
 
-/// A vertex with its normal: 16 bytes, so that 1.7 million triangles take about 34 MB with their indices.
+/// A vertex with its normal: 24 bytes, so that 1.7 million triangles take about 41 MB with their indices.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 struct Vertex {
     position: [f32; 3],
     /// Folded onto a square, 16 bits each: off by less than 0.006 degrees.
     normal: [i16; 2],
+    /// Square roots of linear red, green and blue, 8 bits each; 255 where these count, and not the body's.
+    colour: [u8; 4],
+    /// Roughness, metallic.
+    finish: [u8; 4],
 }
 
 /// One body of one state. Mirrors `struct Instance` of mesh.wgsl.
@@ -35,6 +39,8 @@ pub(crate) struct Material {
     pub(crate) finish: Finish,
     /// Share of the colour shown as it is, without lighting, in [0, 1].
     pub(crate) own_light: f32,
+    /// Looks of the mesh's triangles count instead.
+    pub(crate) by_triangle: bool,
 }
 
 impl Material {
@@ -45,6 +51,7 @@ impl Material {
             colour: [red, green, blue, body.opacity],
             finish: body.finish.unwrap_or(usual),
             own_light: 0.0,
+            by_triangle: true,
         }
     }
 }
@@ -80,7 +87,7 @@ impl Instance {
                 material.finish.roughness,
                 material.own_light,
                 material.finish.metallic,
-                0.0,
+                f32::from(u8::from(material.by_triangle)),
             ],
         }
     }
@@ -88,9 +95,14 @@ impl Instance {
 
 impl MeshBuffers {
     pub(crate) fn new(device: &wgpu::Device, shaded: &Shaded) -> Self {
-        let vertex = |&(position, normal)| Vertex {
-            position,
-            normal: folded(normal),
+        let vertex = |&(position, normal, look): &([f32; 3], [f32; 3], u32)| {
+            let (colour, finish) = packed(shaded.looks.get(look as usize));
+            Vertex {
+                position,
+                normal: folded(normal),
+                colour,
+                finish,
+            }
         };
         let mut vertices: Vec<Vertex> = shaded.vertices.iter().map(vertex).collect();
         if vertices.is_empty() {
@@ -131,6 +143,17 @@ impl MeshBuffers {
     }
 }
 
+/// Colour and finish of a vertex; those of the body where it has no look.
+fn packed(look: Option<&Look>) -> ([u8; 4], [u8; 4]) {
+    let Some(look) = look else {
+        return ([0; 4], [0; 4]);
+    };
+    let byte = |share: f32| (255.0 * share).round() as u8;
+    let [red, green, blue] = look.colour.map(|light| byte(light.sqrt()));
+    let [roughness, metallic] = [look.finish.roughness, look.finish.metallic].map(byte);
+    ([red, green, blue, 255], [roughness, metallic, 0, 0])
+}
+
 fn index_buffer(device: &wgpu::Device, indices: &[u32]) -> wgpu::Buffer {
     let at_least_one = if indices.is_empty() { &[0] } else { indices };
     filled(device, "indices", at_least_one, wgpu::BufferUsages::INDEX)
@@ -148,8 +171,8 @@ fn folded([x, y, z]: [f32; 3]) -> [i16; 2] {
     place.map(|p| (p * f32::from(i16::MAX)).round() as i16)
 }
 
-const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 2] =
-    wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm16x2];
+const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 4] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm16x2, 8 => Unorm8x4, 9 => Unorm8x4];
 const INSTANCE_ATTRIBUTES: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![
     2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Float32x4, 6 => Float32x4, 7 => Float32x4
 ];

@@ -59,6 +59,7 @@ pub fn cuboid(half_extents: [f32; 3]) -> TriangleMesh {
             .iter()
             .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
             .collect(),
+        looks: None,
     }
 }
 
@@ -94,6 +95,7 @@ fn revolve(profile: &[[f32; 2]], facets: u32) -> TriangleMesh {
     TriangleMesh {
         vertices,
         triangles,
+        looks: None,
     }
 }
 

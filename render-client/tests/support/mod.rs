@@ -107,6 +107,7 @@ pub(crate) fn box_with_hole(half: f32, radius: f32, facets: u32) -> TriangleMesh
     TriangleMesh {
         vertices,
         triangles,
+        looks: None,
     }
 }
 

@@ -82,6 +82,7 @@ fn check_mesh(path: &Path) -> FileReport {
         Err(error) => return report(path, FileKind::Mesh, Err(error)),
     };
     let figures = MeshFigures::of(&mesh);
+    let lost = look.not_drawn(&Appearance::default(), &mesh);
     let mut faults: Vec<String> = figures.faults().iter().map(ToString::to_string).collect();
     if let Err(error) = Mesh::new(mesh.vertices, mesh.triangles)
         && faults.is_empty()
@@ -95,7 +96,6 @@ fn check_mesh(path: &Path) -> FileReport {
     let longest = figures.size_m.iter().copied().fold(0.0, f64::max);
     let mut notes = Vec::new();
     notes.extend(doubt_about_size("the mesh", longest));
-    let lost = look.not_drawn(&Appearance::default());
     notes.extend(lost.map(|lost| format!("of its look is not drawn: {lost}")));
     let summary = figures.to_string();
     FileReport {

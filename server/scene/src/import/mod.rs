@@ -240,7 +240,7 @@ fn part(
             "NOT MENDED: the surface touches or runs through itself; its mass counts what overlaps twice, and the force inside is not defined",
         ));
     }
-    if let Some(lost) = look.not_drawn(&Appearance::default()) {
+    if let Some(lost) = look.not_drawn(&Appearance::default(), &RawMesh::default()) {
         let text = format!("of its look is not drawn: {lost}");
         let finding = Finding::new("look-lost", &Places::default(), text);
         report.findings.push(finding);

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use taut_proto::mesh_blob::MAX_LOOKS;
+
 use super::RawMesh;
 use super::mtl::read_library;
 use super::read::below;
@@ -40,16 +42,39 @@ pub(super) struct Materials {
 pub(crate) struct FileLook {
     /// Of the material that covers the largest area.
     pub(crate) appearance: Appearance,
+    /// Where they do not all look alike: lengths of runs of triangles, in the mesh's order, with how each looks.
+    pub(crate) parts: Vec<(Appearance, usize)>,
+    /// What is lost where parts cannot be drawn, as a part of a sentence.
+    pub(crate) merged: Option<String>,
     /// What else the file says and nobody draws, as parts of a sentence.
     pub(crate) lost: Vec<String>,
 }
 
 impl FileLook {
+    /// How each run of the triangles of a drawn mesh looks where a scene says `said` of the body: empty where all look alike, as the scene says by
+    /// a colour, or where the drawn triangles are not those of the file.
+    pub(crate) fn drawn_parts(
+        &self,
+        said: &Appearance,
+        drawn: &RawMesh,
+    ) -> Vec<(Appearance, usize)> {
+        let count: usize = self.parts.iter().map(|(_, count)| count).sum();
+        if said.color.is_some() || count != drawn.triangles.len() {
+            return Vec::new();
+        }
+        let parts = self.parts.iter();
+        parts
+            .map(|(look, count)| (said.or(*look), *count))
+            .collect()
+    }
+
     /// What of it nobody sees where a scene says `said` of the body; `None` if nothing. A scene that names a colour has said what it wants.
-    pub(crate) fn not_drawn(&self, said: &Appearance) -> Option<String> {
+    pub(crate) fn not_drawn(&self, said: &Appearance, drawn: &RawMesh) -> Option<String> {
         let unseen = said.opacity.is_none() && self.appearance.opacity == Some(0.0);
         let unseen = unseen.then_some("all of the body: by its file it has the opacity 0");
-        let lost = self.lost.iter().filter(|_| said.color.is_none());
+        let merged = self.merged.iter();
+        let merged = merged.filter(|_| self.drawn_parts(said, drawn).is_empty());
+        let lost = merged.chain(&self.lost).filter(|_| said.color.is_none());
         let all: Vec<&str> = unseen.into_iter().chain(lost.map(String::as_str)).collect();
         (!all.is_empty()).then(|| all.join(", "))
     }
@@ -95,12 +120,27 @@ impl Materials {
             .iter()
             .filter(|place| of(**place).appearance != material.appearance)
             .count();
-        if others > 0 {
-            lost.push(format!(
+        let merged = (others > 0).then(|| {
+            format!(
                 "{others} of its materials: all of the body has that of the largest area, \"{}\"",
                 material.name
-            ));
+            )
+        });
+        let opaque = material.appearance.opacity;
+        let others = places
+            .iter()
+            .filter(|place| of(**place).appearance.opacity != opaque);
+        match others.count() {
+            0 => {}
+            others => lost.push(format!(
+                "the opacity of {others} of its materials: all of the body has that of \"{}\"",
+                material.name
+            )),
         }
+        let parts = match merged {
+            Some(_) if places.len() <= MAX_LOOKS => self.parts(&of),
+            _ => Vec::new(),
+        };
         // A library that cannot be read is said above, and may define them.
         let undefined = places.iter().filter_map(|place| self.list.get(*place));
         let undefined = undefined.filter(|material| all_read && !material.is_defined);
@@ -121,8 +161,26 @@ impl Materials {
         }
         FileLook {
             appearance: material.appearance,
+            parts,
+            merged,
             lost,
         }
+    }
+
+    /// Runs of triangles that look alike. The opacity is the body's.
+    fn parts(&self, of: impl Fn(usize) -> Material) -> Vec<(Appearance, usize)> {
+        let mut parts: Vec<(Appearance, usize)> = Vec::new();
+        for (material, count) in &self.runs {
+            let look = Appearance {
+                opacity: None,
+                ..of(material.unwrap_or(self.list.len())).appearance
+            };
+            match parts.last_mut() {
+                Some((last, triangles)) if *last == look => *triangles += count,
+                _ => parts.push((look, *count)),
+            }
+        }
+        parts
     }
 
     /// Area of each material of the list, m^2; of no material at the end.
@@ -174,10 +232,25 @@ mod tests {
     fn the_material_of_the_largest_area_is_the_bodys() {
         let look = of(&[(Some(0), 5), (Some(1), 7)]);
         assert_eq!(look.appearance.color, Some([0.2, 0.0, 0.0]));
-        assert_eq!(
-            look.lost,
-            ["1 of its materials: all of the body has that of the largest area, \"two\""]
-        );
+        let merged = "1 of its materials: all of the body has that of the largest area, \"two\"";
+        assert_eq!(look.merged.as_deref(), Some(merged));
+        // Each part looks as its own, unless the scene says how all of it looks, or the triangles are others.
+        let cube = cuboid([1.0, 1.0, 1.0]);
+        let [said, red] = [Appearance::default(), coloured("", 0.9).appearance];
+        let counts = |parts: Vec<(Appearance, usize)>| -> Vec<_> {
+            let red = |(look, count): &(Appearance, usize)| (look.color.map(|c| c[0]), *count);
+            parts.iter().map(red).collect()
+        };
+        let drawn = counts(look.drawn_parts(&said, &cube));
+        assert_eq!(drawn, [(Some(0.1), 5), (Some(0.2), 7)]);
+        assert_eq!(look.not_drawn(&said, &cube), None);
+        assert_eq!(look.drawn_parts(&red, &cube), []);
+        let other = RawMesh {
+            triangles: cube.triangles[1..].to_vec(),
+            ..cube
+        };
+        assert_eq!(look.drawn_parts(&said, &other), []);
+        assert_eq!(look.not_drawn(&said, &other).as_deref(), Some(merged));
         let look = of(&[(Some(0), 2), (Some(1), 5), (Some(0), 5)]);
         assert_eq!(look.appearance.color, Some([0.1, 0.0, 0.0]));
         // A part without a material counts as one that says nothing.

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::auto_fidelity::AutoFidelity;
 use super::built::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
 use super::load::{Scene, unusable};
-use super::spec::{MassSpec, ObstacleSpec, ReferencePoint, Shape};
+use super::spec::{MassSpec, ObstacleSpec, ReferencePoint, Shape, VisualSpec};
 use crate::appearance::Appearance;
 use crate::check::MeshFigures;
 use crate::document::At;
@@ -28,6 +28,9 @@ const DRAWN_SUBDIVISIONS: u32 = 4;
 const DRAWN_MERIDIANS: usize = 48;
 const DRAWN_SIDES: usize = 72;
 
+/// What is drawn of a body: form, mesh and look.
+type Seen<'s> = (&'s Shape, RawMesh, FileLook);
+
 impl Scene {
     /// Loads and generates the meshes and checks that the method can work on them. All faults are reported.
     pub fn build(&self) -> Result<BuiltScene, FileError> {
@@ -44,6 +47,7 @@ impl Scene {
             .map(|o| self.mesh(&o.shape, &o.shape_at, &mut problems))
             .unzip();
         let (scenery, scenery_lost) = self.built_scenery(&mut problems);
+        let visuals = self.visuals(&mut problems);
         let environment = self.environment().unwrap_or_else(|problem| {
             problems.push(problem);
             None
@@ -82,8 +86,12 @@ impl Scene {
             return Err(spec.god_object.at.problem(text).into());
         }
         let obstacles = self.built_obstacles(obstacle_meshes, textures, auto.as_ref(), &motions);
-        let (bodies, mut lost_looks) =
-            self.drawn_bodies(&body.mesh, &obstacles, &body_look, &looks);
+        let (bodies, mut lost_looks) = self.drawn_bodies(
+            &body.mesh,
+            &obstacles,
+            &[vec![body_look], looks].concat(),
+            visuals,
+        );
         lost_looks.extend(scenery_lost);
         let hand = spec.hand.as_ref().zip(hand_path);
         let world = World { body, obstacles };
@@ -182,19 +190,49 @@ impl Scene {
         &self,
         body: &Mesh,
         obstacles: &[Obstacle],
-        body_look: &FileLook,
         looks: &[FileLook],
+        visuals: Vec<Option<Seen<'_>>>,
     ) -> (Vec<BuiltBody>, BTreeSet<String>) {
         let held = &self.spec.god_object;
-        let look = held.appearance.or(body_look.appearance);
-        let mut bodies = vec![drawn(GOD_OBJECT_NAME, body, held.pose, look)];
-        let mut lost = BTreeSet::from_iter(lost_look(&held.shape, &held.appearance, body_look));
-        for ((obstacle, spec), look) in obstacles.iter().zip(&self.spec.obstacles).zip(looks) {
-            lost.extend(lost_look(&spec.shape, &spec.appearance, look));
-            let look = spec.appearance.or(look.appearance);
-            bodies.push(drawn(&obstacle.name, &obstacle.mesh, obstacle.pose, look));
+        let held = (
+            GOD_OBJECT_NAME,
+            body,
+            held.pose,
+            (&held.shape, &held.appearance),
+        );
+        let obstacles = obstacles.iter().zip(&self.spec.obstacles);
+        let obstacles = obstacles.map(|(obstacle, spec)| {
+            let said = (&spec.shape, &spec.appearance);
+            (obstacle.name.as_str(), &obstacle.mesh, obstacle.pose, said)
+        });
+        let (mut bodies, mut lost) = (Vec::new(), BTreeSet::new());
+        let all = std::iter::once(held)
+            .chain(obstacles)
+            .zip(looks)
+            .zip(visuals);
+        for (((name, mesh, pose, (shape, said)), look), visual) in all {
+            let (shape, raw, look) = match visual {
+                Some((shape, raw, look)) => (shape, raw, look),
+                None => (shape, raw_of(mesh), look.clone()),
+            };
+            let (body, lost_of) = seen((name, pose, said), shape, raw, &look);
+            bodies.push(body);
+            lost.extend(lost_of);
         }
         (bodies, lost)
+    }
+
+    /// What is drawn of bodies instead of their forms: form, mesh and look; the god-object first.
+    fn visuals<'s>(&'s self, problems: &mut Vec<Problem>) -> Vec<Option<Seen<'s>>> {
+        let obstacles = self.spec.obstacles.iter().map(|o| &o.visual);
+        let all = std::iter::once(&self.spec.god_object.visual).chain(obstacles);
+        let mut read = |visual: Option<&'s VisualSpec>| {
+            let visual = visual?;
+            let read = self.raw_mesh(&visual.shape, &visual.at);
+            let read = read.map_err(|error| problems.extend(error.into_problems()));
+            read.ok().map(|(mesh, look)| (&visual.shape, mesh, look))
+        };
+        all.map(|visual| read(visual.as_ref())).collect()
     }
 
     /// What is only seen, and what is lost of its look.
@@ -203,13 +241,10 @@ impl Scene {
         for spec in &self.spec.scenery {
             match self.raw_mesh(&spec.shape, &spec.shape_at) {
                 Ok((mesh, look)) => {
-                    lost.extend(lost_look(&spec.shape, &spec.appearance, &look));
-                    scenery.push(BuiltBody {
-                        name: spec.name.clone(),
-                        mesh,
-                        pose: spec.pose,
-                        appearance: spec.appearance.or(look.appearance),
-                    });
+                    let of = (spec.name.as_str(), spec.pose, &spec.appearance);
+                    let (body, lost_of) = seen(of, &spec.shape, mesh, &look);
+                    scenery.push(body);
+                    lost.extend(lost_of);
                 }
                 Err(error) => problems.extend(error.into_problems()),
             }
@@ -394,22 +429,29 @@ fn simplify_as_asked(
 }
 
 /// What the file of a shape says of its look and nobody sees.
-fn lost_look(shape: &Shape, said: &Appearance, look: &FileLook) -> Option<String> {
-    let file = shape.file()?;
-    let lost = look.not_drawn(said)?;
-    Some(format!("of the look of \"{file}\" is not drawn: {lost}"))
+/// A body as it is drawn, and what is lost of the look of its file.
+fn seen(
+    (name, pose, said): (&str, Pose, &Appearance),
+    shape: &Shape,
+    mesh: RawMesh,
+    look: &FileLook,
+) -> (BuiltBody, Option<String>) {
+    let lost = shape.file().zip(look.not_drawn(said, &mesh));
+    let lost = lost.map(|(file, lost)| format!("of the look of \"{file}\" is not drawn: {lost}"));
+    let body = BuiltBody {
+        name: name.to_owned(),
+        looks: look.drawn_parts(said, &mesh),
+        mesh,
+        pose,
+        appearance: said.or(look.appearance),
+    };
+    (body, lost)
 }
 
-fn drawn(name: &str, mesh: &Mesh, pose: Pose, appearance: Appearance) -> BuiltBody {
-    let raw = RawMesh {
+fn raw_of(mesh: &Mesh) -> RawMesh {
+    RawMesh {
         vertices: mesh.vertices().to_vec(),
         triangles: mesh.triangles().to_vec(),
-    };
-    BuiltBody {
-        name: name.to_owned(),
-        mesh: raw,
-        pose,
-        appearance,
     }
 }
 

@@ -27,6 +27,8 @@ pub struct BuiltBody {
     pub pose: Pose,
     /// How it looks: what the scene says, else its mesh file.
     pub appearance: Appearance,
+    /// How its triangles look where they do not all look alike: lengths of runs of them, in their order. The opacity is the body's.
+    pub looks: Vec<(Appearance, usize)>,
 }
 
 /// How an obstacle moves.

@@ -309,6 +309,9 @@ impl Scene {
         let held = &self.spec.god_object;
         let mut names: Vec<(&str, &At)> = Vec::new();
         names.extend(held.shape.file().map(|name| (name, &held.shape_at)));
+        let obstacles = self.spec.obstacles.iter().map(|o| &o.visual);
+        let visuals = std::iter::once(&held.visual).chain(obstacles).flatten();
+        names.extend(visuals.filter_map(|seen| Some((seen.shape.file()?, &seen.at))));
         for obstacle in &self.spec.obstacles {
             let (map, motion) = (&obstacle.height_map, &obstacle.motion);
             names.extend(obstacle.shape.file().map(|name| (name, &obstacle.shape_at)));

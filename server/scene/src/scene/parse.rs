@@ -7,7 +7,7 @@ use taut_plant::HandPreset;
 
 use super::edit::object_name;
 use super::parse_look::{appearance, scenery};
-use super::parse_shape::{pose, rotation_of, shape, surface};
+use super::parse_shape::{pose, rotation_of, shape, surface, visual};
 use super::settings_tables::{CouplingSpec, LimitSpec, MethodSpec};
 use super::spec::{
     BodySpec, EnvironmentSpec, HandPathSpec, MassSpec, MotionSpec, ObstacleSpec, ReferencePoint,
@@ -115,6 +115,7 @@ fn god_object(section: Section<'_>) -> Option<BodySpec> {
     let pose = pose(&section);
     let reference_point = reference_point(&section);
     let appearance = appearance(&section);
+    let visual = visual(&section);
     let at = section.at().clone();
     section.finish();
     Some(BodySpec {
@@ -123,6 +124,7 @@ fn god_object(section: Section<'_>) -> Option<BodySpec> {
         pose: pose?,
         reference_point: reference_point?,
         appearance,
+        visual,
         at,
         shape_at,
     })
@@ -192,6 +194,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
             section.complain(&written.at, text);
         }
         let appearance = appearance(&section);
+        let visual = visual(&section);
         let at = section.at();
         if obstacles.len() >= MAX_OBSTACLES {
             section.complain(
@@ -209,6 +212,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
                 surface,
                 motion,
                 appearance,
+                visual,
                 height_map,
                 shape_at,
             });

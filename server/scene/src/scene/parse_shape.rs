@@ -3,7 +3,7 @@
 use god_object::{ForceShading, Pose, SineTexture, Surface, Texture};
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::spec::{HeightMapMapping, HeightMapSpec, Shape};
+use super::spec::{HeightMapMapping, HeightMapSpec, Shape, VisualSpec};
 use crate::document::{Range, Section, Value};
 use crate::shapes::{Axis, PLATE, hole_circumradius};
 use taut_recording::unit_quaternion;
@@ -36,8 +36,26 @@ type ReadPrimitive = fn(&Section<'_>) -> Option<Shape>;
 
 /// `shape = { ... }`; complaints go to the section.
 pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
-    let Some(shape) = body.section("shape") else {
-        if !body.has("shape") {
+    shape_of(body, "shape")
+}
+
+/// `visual = { ... }`, in the same words; complaints go to the section.
+pub(super) fn visual(body: &Section<'_>) -> Option<VisualSpec> {
+    let at = body.get("visual")?.at.clone();
+    let shape = shape_of(body, "visual")?;
+    if let Shape::Mesh {
+        simplify: Some(_), ..
+    } = &shape
+    {
+        let text = "`simplify` has no meaning for `visual`, which costs no collision detection; leave it out";
+        body.complain(&at, text);
+    }
+    Some(VisualSpec { shape, at })
+}
+
+fn shape_of(body: &Section<'_>, key: &'static str) -> Option<Shape> {
+    let Some(shape) = body.section(key) else {
+        if key == "shape" && !body.has(key) {
             body.complain_missing(
                 "shape",
                 "shape = { mesh = \"body.ply\" } or { sphere = { radius = 0.01 } }",

@@ -153,8 +153,18 @@ pub struct BodySpec {
     pub reference_point: ReferencePoint,
     /// How it looks.
     pub appearance: Appearance,
+    /// What is drawn instead of its form.
+    pub visual: Option<VisualSpec>,
     pub(crate) at: At,
     pub(crate) shape_at: At,
+}
+
+/// `visual = { mesh = "fine.glb" }`: what is drawn of a body, in its frame, and never touched; a mesh need not be closed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VisualSpec {
+    /// Its form.
+    pub shape: Shape,
+    pub(crate) at: At,
 }
 
 /// A body that stands still, or moves as a trace says.
@@ -174,6 +184,8 @@ pub struct ObstacleSpec {
     pub motion: Option<MotionSpec>,
     /// How it looks.
     pub appearance: Appearance,
+    /// What is drawn instead of its form.
+    pub visual: Option<VisualSpec>,
     pub(crate) shape_at: At,
 }
 

@@ -161,6 +161,67 @@ fn the_material_of_a_gltf_file_is_the_bodys_where_the_scene_says_nothing() {
 }
 
 #[test]
+fn triangles_look_as_their_own_materials_say() {
+    let folder = Folder::new();
+    folder.gltf("a.gltf", &format!("{STEEL},{RED}"), "");
+    let looks_of = |held: &str| {
+        let built = folder.built(held, "");
+        let count = |(look, count): &(Appearance, usize)| (look.color, look.roughness, *count);
+        let looks: Vec<_> = built.bodies[0].looks.iter().map(count).collect();
+        (looks, built.lost_looks)
+    };
+    let (looks, lost) = looks_of("shape = { mesh = \"a.gltf\" }");
+    let steel = Some([0.25, 0.5, 0.75]);
+    let counts: Vec<_> = looks.iter().map(|(_, _, count)| *count).collect();
+    assert_eq!((counts, looks[0].0), (vec![10, 2], steel));
+    assert_ne!(looks[1].0, steel);
+    assert_eq!(lost, [""; 0]);
+    // What the scene says counts for all of them.
+    let (looks, _) = looks_of("shape = { mesh = \"a.gltf\" }\nroughness = 0.125");
+    assert!(looks.len() == 2 && looks.iter().all(|look| look.1 == Some(0.125)));
+    let (looks, _) = looks_of("shape = { mesh = \"a.gltf\" }\ncolor = \"#ffffff\"");
+    assert_eq!(looks, []);
+}
+
+#[test]
+fn what_is_drawn_may_be_another_form_than_what_is_felt() {
+    let folder = Folder::new();
+    folder.gltf("a.gltf", &format!("{STEEL},{RED}"), "");
+    let open = "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nf 1 2 3\n";
+    folder.write("sheet.obj", open);
+    let built = folder.built(
+        "shape = { sphere = { radius = 0.02 } }\nvisual = { mesh = \"a.gltf\", unit = \"cm\" }",
+        "[[obstacle]]\nname = \"plate\"\nshape = { box = { half_extents = [0.1, 0.1, 0.01] } }\n\
+         pose = { position = [0.0, 0.0, -0.2] }\nvisual = { mesh = \"sheet.obj\" }\ncolor = \"#ff0000\"\n",
+    );
+    assert!(built.world.body.primitive.is_some(), "a round ball is felt");
+    let [held, plate] = [&built.bodies[0], &built.bodies[1]];
+    assert_eq!((held.mesh.triangles.len(), held.looks.len()), (12, 2));
+    let highest = held.mesh.vertices.iter().map(|v| v.z).fold(0.0, f64::max);
+    assert!((highest - 0.03e-2).abs() < 1e-9, "{highest}");
+    assert_eq!(plate.mesh.triangles.len(), 1, "an open sheet may be seen");
+    assert_eq!(plate.appearance.color, Some([1.0, 0.0, 0.0]));
+    assert_eq!(built.world.obstacles[0].mesh.triangles().len(), 12);
+    // What cannot be read is said with its place, and what costs no collision detection is not simplified.
+    for (visual, said) in [
+        ("{ mesh = \"none.obj\" }", "none.obj"),
+        (
+            "{ mesh = \"a.gltf\", simplify = { max_error = 1e-4 } }",
+            "no meaning for `visual`",
+        ),
+        ("{}", "names 0 forms"),
+    ] {
+        let text = format!(
+            "name = \"x\"\n[god_object]\nmass = 1.0\nshape = {{ sphere = {{ radius = 0.02 }} }}\nvisual = {visual}\n"
+        );
+        let scene = Scene::parse("s.toml", &text, folder.0.path());
+        let refused = scene.and_then(|scene| scene.build()).map(|_| ());
+        let text = refused.expect_err("refused").to_string();
+        assert!(text.contains(said) && text.contains("s.toml:5"), "{text}");
+    }
+}
+
+#[test]
 fn what_a_body_cannot_show_of_its_file_is_said_once() {
     let folder = Folder::new();
     folder.gltf("a.gltf", &format!("{STEEL},{RED}"), ",\"COLOR_0\":2");
@@ -168,9 +229,7 @@ fn what_a_body_cannot_show_of_its_file_is_said_once() {
     assert_eq!(look.color, Some([0.25, 0.5, 0.75]));
     assert_eq!(
         lost,
-        [
-            "of the look of \"a.gltf\" is not drawn: 1 of its materials: all of the body has that of the largest area, \"steel\", its colours of vertices"
-        ]
+        ["of the look of \"a.gltf\" is not drawn: its colours of vertices"]
     );
     // A factor of a picture says nothing without the picture.
     let picture = STEEL.replace(

@@ -3,12 +3,12 @@
 use god_object::Pose;
 use god_object::nalgebra::Point3;
 use taut_link::Content;
-use taut_proto::mesh_blob::Positions;
+use taut_proto::mesh_blob::{MAX_LOOKS, Positions};
 use taut_proto::scene::{
     BodyDescription, NodeDescription, OutputDescription, ScreenDescription, WindowDescription,
 };
-use taut_proto::{Finish, MeshBlob, MeshHash, PoseF64, SceneDescription};
-use taut_scene::{BuiltBody, BuiltScene, Workbench, srgb};
+use taut_proto::{Finish, Look, Looks, MeshBlob, MeshHash, PoseF64, SceneDescription};
+use taut_scene::{Appearance, BuiltBody, BuiltScene, Workbench, srgb};
 
 use crate::shared::failure::Failure;
 
@@ -30,9 +30,10 @@ pub(crate) fn bodies(
     scene: &BuiltScene,
 ) -> impl Iterator<Item = Result<(BodyDescription, MeshBlob), Failure>> {
     let described = |(index, body): (usize, &BuiltBody)| {
-        let (hash, blob) = mesh(body)?;
+        let usual = usual_colour(index == 0);
+        let (hash, blob) = mesh(body, usual)?;
         let look = &body.appearance;
-        let [red, green, blue] = look.color.unwrap_or(usual_colour(index == 0));
+        let [red, green, blue] = look.color.unwrap_or(usual);
         let description = BodyDescription {
             name: body.name.as_str().into(),
             mesh: hash,
@@ -127,7 +128,7 @@ pub(crate) fn of_workbench(
     }
 }
 
-fn mesh(body: &BuiltBody) -> Result<(MeshHash, MeshBlob), Failure> {
+fn mesh(body: &BuiltBody, usual: [f32; 3]) -> Result<(MeshHash, MeshBlob), Failure> {
     let refused = |error: String| {
         Failure::BadInput(format!(
             "the mesh of \"{}\" cannot be sent to clients: {error}",
@@ -139,16 +140,48 @@ fn mesh(body: &BuiltBody) -> Result<(MeshHash, MeshBlob), Failure> {
         .map_err(|error| refused(error.to_string()))?;
     let look = &body.appearance;
     if look.roughness.is_some() || look.metallic.is_some() {
-        let finish = Finish {
-            roughness: look.roughness.unwrap_or(FINISH.roughness),
-            metallic: look.metallic.unwrap_or(FINISH.metallic),
-        };
         blob = blob
-            .with_finish(finish)
+            .with_finish(finish(look))
+            .map_err(|error| refused(error.to_string()))?;
+    }
+    if let Some(looks) = looks(&body.looks, usual) {
+        blob = blob
+            .with_looks(looks)
             .map_err(|error| refused(error.to_string()))?;
     }
     let hash = MeshHash::of(&blob.encode().map_err(|error| refused(error.to_string()))?);
     Ok((hash, blob))
+}
+
+fn finish(look: &Appearance) -> Finish {
+    Finish {
+        roughness: look.roughness.unwrap_or(FINISH.roughness),
+        metallic: look.metallic.unwrap_or(FINISH.metallic),
+    }
+}
+
+/// Looks of runs of triangles; `None` where all look alike, or no mesh holds so many.
+fn looks(parts: &[(Appearance, usize)], usual: [f32; 3]) -> Option<Looks> {
+    let mut looks = Looks {
+        list: Vec::new(),
+        of_triangles: Vec::new(),
+    };
+    for (part, count) in parts {
+        let look = Look {
+            colour: part.color.unwrap_or(usual),
+            finish: finish(part),
+        };
+        let place = looks.list.iter().position(|known| *known == look);
+        let place = place.unwrap_or_else(|| {
+            looks.list.push(look);
+            looks.list.len() - 1
+        });
+        let place = u8::try_from(place).ok().filter(|_| place < MAX_LOOKS)?;
+        looks
+            .of_triangles
+            .extend(std::iter::repeat_n(place, *count));
+    }
+    (!looks.list.is_empty()).then_some(looks)
 }
 
 fn array(point: &Point3<f64>) -> [f64; 3] {
