@@ -46,9 +46,16 @@ fn encoded(light: f64) -> f64 {
     }
 }
 
-/// The colour that `#rrggbb` names; `None` if the text is none.
+/// The colour that `#rrggbb` or a name of CSS says; `None` if the text is none.
 pub(crate) fn colour_of_text(text: &str) -> Option<[f32; 3]> {
-    let digits = text.strip_prefix('#')?;
+    let Some(digits) = text.strip_prefix('#') else {
+        // Letters only: of CSS the names are taken, and no functions.
+        let is_name = text.bytes().all(|letter| letter.is_ascii_alphabetic());
+        let named = csscolorparser::parse(text).ok().filter(|_| is_name)?;
+        let parts = [named.r, named.g, named.b];
+        let is_opaque = named.a >= 1.0; // `transparent` is no colour
+        return is_opaque.then(|| parts.map(|part| linear(f64::from(part)) as f32));
+    };
     if digits.len() != 6 || !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
         return None;
     }
@@ -85,9 +92,37 @@ mod tests {
     }
 
     #[test]
+    fn names_of_css_are_colours() {
+        for (name, text) in [
+            ("red", "#ff0000"),
+            ("Red", "#ff0000"),
+            ("steelblue", "#4682b4"),
+            ("RebeccaPurple", "#663399"),
+            ("grey", "#808080"),
+            ("black", "#000000"),
+        ] {
+            let colour = colour_of_text(name).unwrap();
+            assert_eq!(text_of_colour(colour), text, "{name}");
+        }
+    }
+
+    #[test]
     fn what_is_no_colour_is_none() {
         for text in [
-            "red", "808080", "#80808", "#8080800", "#80808g", "#+80808", "#8080é",
+            "redd",
+            "transparent",
+            "currentcolor",
+            "none",
+            "",
+            "rgb(1,2,3)",
+            "abc",
+            "fff",
+            "808080",
+            "#80808",
+            "#8080800",
+            "#80808g",
+            "#+80808",
+            "#8080é",
         ] {
             assert_eq!(colour_of_text(text), None, "{text}");
         }

@@ -26,7 +26,7 @@ mod trace;
 mod workbench;
 
 pub use appearance::{Appearance, srgb};
-pub use check::{FaultPlaces, FileKind, FileReport, MeshFigures, check};
+pub use check::{FaultPlaces, FileKind, FileReport, Meeting, MeshFigures, check, check_in};
 pub use document::Document;
 pub use environment_file::read_environment;
 pub use fidelity::FidelityPlan;
@@ -51,7 +51,7 @@ pub use taut_plant::HandPreset;
 pub use taut_recording::{NORM_TOLERANCE, unit_quaternion};
 pub use trace::{
     DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS,
-    TraceSample,
+    TraceSample, looping_fault,
 };
 pub use workbench::{
     AlsoKeyFile, Device, DeviceDynamics, FrameSwap, Frames, HeadTracking, Log, LogLevel, Machine,

@@ -10,8 +10,10 @@ use std::time::{Duration, Instant};
 
 /// Work that takes longer is spoken of.
 const SILENT_TIME: Duration = Duration::from_secs(1);
-/// Longest time between two lines; before, each takes twice as long as the one before.
-const LONGEST_PAUSE: Duration = Duration::from_secs(30);
+/// Time between two lines: a log keeps them all, and who waits looks again after a few seconds.
+const PAUSE: Duration = Duration::from_secs(5);
+/// A share below this one, %, or a time below a second says too little of the time that is left.
+const LEAST_SHARE: usize = 5;
 /// Work on fewer triangles takes no second, and no thread watches it.
 const QUICK_TRIANGLES: usize = 10_000;
 
@@ -28,6 +30,9 @@ pub(crate) struct Progress {
 struct Share {
     done: AtomicUsize,
     total: AtomicUsize,
+    /// Which attempt it is, and of how many at most; 0 of work that is done once.
+    attempt: AtomicUsize,
+    attempts: AtomicUsize,
 }
 
 impl Progress {
@@ -55,7 +60,7 @@ impl Progress {
             let mut pause = silent;
             while ended.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
                 say(&line(&what, begun.elapsed(), &watched));
-                pause = (2 * pause).min(LONGEST_PAUSE);
+                pause = PAUSE;
             }
         };
         // Without a thread the work goes on in silence.
@@ -68,6 +73,13 @@ impl Progress {
             end: Some(end),
             watcher,
         }
+    }
+
+    /// The work begins anew, for the `attempt`th time of `attempts` at most: shares are of this attempt, and the time that is left is not known.
+    pub(crate) fn attempt(&self, attempt: usize, attempts: usize) {
+        self.show(0, 0);
+        self.share.attempt.store(attempt, Ordering::Relaxed);
+        self.share.attempts.store(attempts, Ordering::Relaxed);
     }
 
     /// Says how far the work is.
@@ -88,13 +100,23 @@ impl Drop for Progress {
 
 fn line(what: &str, elapsed: Duration, share: &Share) -> String {
     let seconds = elapsed.as_secs();
-    let (done, total) = (
-        share.done.load(Ordering::Relaxed),
-        share.total.load(Ordering::Relaxed),
-    );
-    match (100 * done).checked_div(total) {
-        Some(percent) => format!("{what}: {} % after {seconds} s", percent.min(100)),
-        None => format!("{what}: {seconds} s so far"),
+    let read = |number: &AtomicUsize| number.load(Ordering::Relaxed);
+    let (done, total) = (read(&share.done), read(&share.total));
+    let percent = (100 * done).checked_div(total).map(|share| share.min(100));
+    let attempt = match (read(&share.attempt), read(&share.attempts)) {
+        (_, 0) => String::new(),
+        (attempt, attempts) => format!("attempt {attempt} of at most {attempts}, "),
+    };
+    match percent {
+        Some(percent) if !attempt.is_empty() => {
+            format!("{what}: {attempt}{percent} % of it, after {seconds} s")
+        }
+        Some(percent @ LEAST_SHARE..) if seconds > 0 => {
+            let left = elapsed.as_secs_f64() * (100 - percent) as f64 / percent as f64;
+            format!("{what}: {percent} % after {seconds} s, about {left:.0} s left")
+        }
+        Some(percent) => format!("{what}: {percent} % after {seconds} s"),
+        None => format!("{what}: {attempt}{seconds} s so far"),
     }
 }
 
@@ -110,19 +132,34 @@ mod tests {
         (progress, lines)
     }
 
+    fn at(seconds: u64, done: usize, total: usize, attempts: usize) -> String {
+        let share = Share::default();
+        share.done.store(done, Ordering::Relaxed);
+        share.total.store(total, Ordering::Relaxed);
+        share.attempt.store(attempts.min(2), Ordering::Relaxed);
+        share.attempts.store(attempts, Ordering::Relaxed);
+        line("a", Duration::from_secs(seconds), &share)
+    }
+
     #[test]
-    fn long_work_says_what_it_does_and_how_far_it_is() {
-        let (progress, lines) = watched();
+    fn the_time_left_is_said_where_it_is_known() {
+        assert_eq!(at(6, 30, 120, 0), "a: 25 % after 6 s, about 18 s left");
+        assert_eq!(at(6, 1, 120, 0), "a: 0 % after 6 s");
+        assert_eq!(at(6, 0, 0, 0), "a: 6 s so far");
+        assert_eq!(
+            at(6, 30, 120, 8),
+            "a: attempt 2 of at most 8, 25 % of it, after 6 s"
+        );
+        assert_eq!(at(6, 0, 0, 8), "a: attempt 2 of at most 8, 6 s so far");
+    }
+
+    #[test]
+    fn long_work_says_what_it_does() {
+        let (_progress, lines) = watched();
         let first = lines.recv().unwrap();
         assert!(
             first.starts_with("a: measuring: ") && first.ends_with(" s so far"),
             "{first}"
-        );
-        progress.show(30, 120);
-        let with_share = lines.iter().find(|line| line.contains('%')).unwrap();
-        assert!(
-            with_share.starts_with("a: measuring: 25 % after "),
-            "{with_share}"
         );
     }
 

@@ -93,7 +93,8 @@ fn compute(original: Mesh, max_error: f64, body: &str) -> (Mesh, Simplified) {
         format_args!("{body}: simplifying {before} triangles"),
     );
     let mut reason = "no candidate has fewer triangles".to_owned();
-    for level in LEVELS {
+    for (tried, level) in LEVELS.into_iter().enumerate() {
+        progress.attempt(tried + 1, LEVELS.len());
         let raw = candidate(&original, max_error as f32 * level);
         if raw.triangles.len() >= before {
             break; // finer levels have no fewer
@@ -185,13 +186,20 @@ fn measured(
         if found.at_most <= max_error {
             Ok(found.at_most)
         } else {
-            Err(format!(
-                "the candidates are up to {:.3e} m away",
-                found.at_least
-            ))
+            Err(too_far(found.at_least, max_error))
         }
     };
     let to_original = bound(&mesh, original, 0)?;
     let from_original = bound(original, &mesh, mesh.triangles().len())?;
     Ok((mesh, [to_original, from_original]))
+}
+
+/// Why a candidate is not taken that is at least so far away, m.
+fn too_far(at_least: f64, max_error: f64) -> String {
+    let how_far = if at_least > max_error {
+        format!("the finest candidate is {at_least:.6e} m away")
+    } else {
+        format!("the finest candidate is {at_least:.6e} m away, too near to the limit to tell")
+    };
+    format!("{how_far}; allow a larger distance (max_error, --simplify)")
 }

@@ -88,11 +88,16 @@ pub struct ExportArgs {
 
 /// `taut check`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut check workbench.toml scene.toml part.ply hand.csv")]
+#[command(
+    after_help = "Examples:\n  taut check workbench.toml scene.toml part.ply hand.csv\n  taut check part.stl --unit mm"
+)]
 pub struct CheckArgs {
     /// Workbench files, scenes, meshes, traces
     #[arg(required = true, value_name = "F")]
     pub files: Vec<PathBuf>,
+    /// Unit of meshes whose format names none, STL, OBJ and PLY: m, dm, cm, mm, um, inch (default: m); scenes say it themselves
+    #[arg(long, value_name = "UNIT")]
+    pub unit: Option<LengthUnit>,
     /// Print the findings as JSON on standard output
     #[arg(long)]
     pub json: bool,
@@ -117,14 +122,17 @@ pub struct ImportArgs {
     #[arg(long, value_name = "AXIS")]
     pub up: Option<UpAxis>,
     /// Use as few triangles as keep within this distance of the part
-    #[arg(long, value_name = "METRES", value_parser = positive_length)]
+    #[arg(long, value_name = "METRES", value_parser = positive_length, allow_negative_numbers = true)]
     pub simplify: Option<f64>,
     /// Close holes of at most this many edges (default: 16, if a hole is below 1 % of its surface; none with --thicken)
-    #[arg(long, value_name = "EDGES", value_parser = hole_edges)]
+    #[arg(long, value_name = "EDGES", value_parser = hole_edges, allow_negative_numbers = true)]
     pub close_holes: Option<usize>,
     /// Make open sheets solids of this thickness (default: sheets are refused)
-    #[arg(long, value_name = "METRES", value_parser = positive_length)]
+    #[arg(long, value_name = "METRES", value_parser = positive_length, allow_negative_numbers = true)]
     pub thicken: Option<f64>,
+    /// Take only this node, object or group of files that name any, and all that is part of it; may be repeated (default: all, as one body)
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
     /// Name of the scene (default: the folder's)
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,

@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
-use taut_scene::{Document, FileKind, FileReport, Problem, Workbench};
+use taut_scene::{
+    Device, Document, FileKind, FileReport, LengthUnit, Problem, Workbench, looping_fault,
+};
 
 use crate::session::setup::refusals;
 
 /// Reads each file and says everything that is wrong with it.
-pub(super) fn reports<P: AsRef<Path>>(files: &[P]) -> Vec<FileReport> {
-    let mut reports = taut_scene::check(files);
+pub(super) fn reports<P: AsRef<Path>>(files: &[P], unit: Option<LengthUnit>) -> Vec<FileReport> {
+    let mut reports = taut_scene::check_in(files, unit);
     for (report, file) in reports.iter_mut().zip(files) {
         if report.kind == FileKind::Workbench {
             let (problems, warnings) = refused(file.as_ref());
@@ -28,14 +30,29 @@ fn refused(file: &Path) -> (Vec<Problem>, Vec<String>) {
     let text = std::fs::read_to_string(file).unwrap_or_default();
     let document = Document::parse(&name, &text).ok();
     let (refusals, warnings) = refusals(&workbench);
-    let problems = refusals.into_iter().map(|refusal| Problem {
-        file: name.clone(),
-        line: document
-            .as_ref()
-            .and_then(|document| document.line_of(refusal.table, refusal.key)),
-        text: refusal.why.to_string(),
+    let problems = refusals.into_iter().map(|refusal| {
+        let path = (refusal.table, refusal.key) == ("device", "path");
+        let of_path = path.then(|| hand_fault(&workbench)).flatten();
+        Problem {
+            file: name.clone(),
+            line: document
+                .as_ref()
+                .and_then(|document| document.line_of(refusal.table, refusal.key)),
+            text: of_path.map_or_else(|| refusal.why.to_string(), |problem| problem.to_string()),
+        }
     });
     (problems.collect(), warnings)
+}
+
+/// Why the simulated hand cannot follow its path, with the line of the path's file.
+fn hand_fault(workbench: &Workbench) -> Option<Problem> {
+    match &workbench.device {
+        Device::Simulated {
+            path: Some(path), ..
+        } => looping_fault(path),
+        Device::Simulated { path: None, .. } => workbench.load_scene().ok()?.hand_fault(),
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -65,7 +82,7 @@ mod tests {
         ] {
             assert!(std::fs::write(path, text).is_ok());
         }
-        let [report] = &reports(&[&file])[..] else {
+        let [report] = &reports(&[&file], None)[..] else {
             panic!("one report of one file");
         };
         let folder = directory.path().display().to_string();

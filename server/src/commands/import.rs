@@ -19,6 +19,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<ImportReport, Failure> {
         thicken: args.thicken,
         name: args.name.clone(),
         obstacles_only: args.obstacle,
+        only: args.only.clone(),
     };
     // Until there is something to remove, a signal ends the process as ever.
     let mut signals = None;

@@ -192,7 +192,7 @@ fn recorded_command(directory: &Path, args: &ReplayArgs) -> Result<ExitCode> {
 }
 
 fn check_command(args: &CheckArgs) -> Result<ExitCode> {
-    let reports = check::reports(&args.files);
+    let reports = check::reports(&args.files, args.unit);
     if args.json {
         print(as_json(&reports)?)?;
     } else {

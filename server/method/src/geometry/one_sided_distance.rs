@@ -15,7 +15,7 @@ use nalgebra::{Point3, Vector3};
 use super::mesh::Mesh;
 use super::nearest::{nearest_on_mesh, to_triangle};
 
-/// A bound this share above the largest distance seen is close enough.
+/// A bound this share above the largest distance seen is close enough, unless the limit lies between the two.
 const ACCURACY: f64 = 0.05;
 /// Distances below this share of the limit are not told apart.
 const FLOOR: f64 = 0.1;
@@ -37,13 +37,14 @@ type Piece = [Point3<f64>; 3];
 /// A bound on the distance of any point of one surface from another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneSidedDistance {
-    /// No point of the first surface is farther from the second, m. Rigorous, rounding included.
+    /// No point of the first surface is farther from the second, m. Rigorous, rounding included; infinite where the search gave up.
     pub at_most: f64,
     /// Some point is this far, m.
     pub at_least: f64,
 }
 
-/// Bounds the distance of the points of `from` to `to`; gives up, with what it knows, as soon as some point is farther than `limit` (m).
+/// Bounds the distance of the points of `from` to `to`; gives up, with what it knows, as soon as some point is farther than `limit` (m). The bound is
+/// above the limit only where some point is, or lies within 1e-4 of it.
 /// `done` is told after each triangle how many there were.
 pub fn one_sided_distance(
     from: &Mesh,
@@ -51,9 +52,16 @@ pub fn one_sided_distance(
     limit: f64,
     mut done: impl FnMut(usize),
 ) -> OneSidedDistance {
+    let reach = |mesh: &Mesh| {
+        let corners = mesh.bounding_box();
+        corners.iter().map(|p| p.coords.amax()).fold(0.0, f64::max)
+    };
+    let rounding = ROUNDING * (reach(from) + reach(to));
     let mut search = OneSided {
         to,
         limit,
+        // What is added to the bound at the end does not lift it over the limit: strips count before they are known, as many as there can be.
+        decided: limit * (1.0 - f64::from(MAX_PIECES) * STRIP) - rounding,
         at_most: 0.0,
         at_least: 0.0,
         pieces: Vec::new(),
@@ -68,21 +76,15 @@ pub fn one_sided_distance(
     }
     for t in 0..from.triangles().len() {
         search.triangle(from.corners(t as u32), from.face_normal(t as u32));
-        if search.at_least > limit {
+        if search.has_given_up() {
             break;
         }
         done(t + 1);
     }
-    let reach = |mesh: &Mesh| {
-        let corners = mesh.bounding_box();
-        corners.iter().map(|p| p.coords.amax()).fold(0.0, f64::max)
-    };
-    let at_most = if search.at_least > limit {
+    let at_most = if search.has_given_up() {
         f64::INFINITY
     } else {
-        search.at_most
-            + f64::from(search.strips) * STRIP * limit
-            + ROUNDING * (reach(from) + reach(to))
+        search.at_most + f64::from(search.strips) * STRIP * limit + rounding
     };
     OneSidedDistance {
         at_most,
@@ -93,6 +95,8 @@ pub fn one_sided_distance(
 struct OneSided<'a> {
     to: &'a Mesh,
     limit: f64,
+    /// Bounds up to this one are surely within the limit, m.
+    decided: f64,
     at_most: f64,
     at_least: f64,
     pieces: Vec<Piece>,
@@ -101,12 +105,17 @@ struct OneSided<'a> {
 }
 
 impl OneSided<'_> {
+    /// Some point is beyond the limit, or a piece within rounding of it is cut too often to tell.
+    fn has_given_up(&self) -> bool {
+        self.at_least.max(self.at_most) > self.limit
+    }
+
     fn triangle(&mut self, corners: Piece, normal: &Vector3<f64>) {
         self.pieces.clear();
         self.pieces.push(corners);
         let (mut seen, mut strips, mut guess) = (0, 0, 0);
         while let Some(piece) = self.pieces.pop() {
-            if self.at_least > self.limit {
+            if self.has_given_up() {
                 return;
             }
             if is_strip(&piece, STRIP * self.limit) {
@@ -170,7 +179,9 @@ impl OneSided<'_> {
             .map(|c| to_triangle(self.to, c, k).0)
             .fold(0.0, f64::max)
             .sqrt();
-        let fine = bound <= self.at_least.max(FLOOR * self.limit) * (1.0 + ACCURACY);
+        // Where the limit lies between bound and distance, the piece is cut until one of them is on the other's side.
+        let close = bound <= self.at_least.max(FLOOR * self.limit) * (1.0 + ACCURACY);
+        let fine = close && (bound <= self.decided || self.decided < FLOOR * self.limit);
         if fine || seen > MAX_PIECES {
             self.at_most = self.at_most.max(bound);
         }

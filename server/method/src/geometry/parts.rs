@@ -1,4 +1,4 @@
-//! The closed parts of a surface, and which of them are inside out.
+//! The parts of a surface, and which of them look the wrong way.
 //!
 //! A part is a set of triangles connected by edges. A part of negative volume is the wall of a cavity where material surrounds it: the winding number
 //! of the other parts is one there. Elsewhere it is inside out: its faces look away from whatever touches it, and no contact would be found.
@@ -9,10 +9,16 @@ use nalgebra::{Point3, Vector3};
 
 /// Triangles of a part at whose middles the winding number is asked for, spread evenly.
 const SAMPLES: usize = 8;
+/// Solid angles that are summed to tell whether one part lies in another, where that allows more than [`SAMPLES`] points: a tenth of a second.
+const MOST_ANGLES: usize = 4_000_000;
 /// Winding numbers are whole; between whole ones the rounding of the sum is all there is.
 const SURROUNDED: f64 = 0.5;
+/// Most parts whose nesting is asked for: a second for all pairs. Importing refuses more.
+const MOST_PARTS: usize = 10_000;
+/// A part whose opening, closed by a fan, is larger than this share of its own area is a sheet: a half sphere has this share. It has no inside.
+const MOST_OPEN: f64 = 0.5;
 
-/// A closed part of a surface that is inside out.
+/// A part of a surface that looks the wrong way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InvertedPart {
     /// Its first triangle.
@@ -21,7 +27,7 @@ pub struct InvertedPart {
     pub triangles: usize,
     /// Middle of the box around it, m.
     pub center: Point3<f64>,
-    /// Signed volume, m^3; negative.
+    /// Signed volume, m^3: negative where material should be inside, positive where a cavity should be.
     pub volume: f64,
 }
 
@@ -57,14 +63,8 @@ pub fn closed_parts(
         .map(|inside| measure(vertices, triangles, inside))
         .collect();
     let depth = |own: &Part| {
-        let around = |other: &&Part| {
-            let encloses =
-                (0..3).all(|k| other.low[k] <= own.low[k] && own.high[k] <= other.high[k]);
-            encloses
-                && !std::ptr::eq(*other, own)
-                && sample_points(vertices, triangles, own)
-                    .all(|point| windings(vertices, triangles, other, &point).abs() > SURROUNDED)
-        };
+        let around =
+            |other: &&Part| !std::ptr::eq(*other, own) && encloses(vertices, triangles, other, own);
         parts.iter().filter(around).count()
     };
     let depths: Vec<usize> = parts.iter().map(depth).collect();
@@ -78,6 +78,138 @@ pub fn closed_parts(
             depth,
         })
         .collect()
+}
+
+/// Whether a part lies within another. Without all of its corners and middles asked for, one that only pokes out may count as within.
+fn encloses(vertices: &[Point3<f64>], triangles: &[[u32; 3]], other: &Part, own: &Part) -> bool {
+    let around = (0..3).all(|k| other.low[k] <= own.low[k] && own.high[k] <= other.high[k]);
+    if !around {
+        return false;
+    }
+    let affordable = (MOST_ANGLES / other.triangles.len()).max(SAMPLES);
+    let step = own.triangles.len().div_ceil(affordable);
+    let surrounds =
+        |point: &Point3<f64>, least: f64| windings(vertices, triangles, other, point).abs() > least;
+    own.triangles.iter().step_by(step).all(|t| {
+        let corners = triangles[*t as usize].map(|v| vertices[v as usize]);
+        let [a, b, c] = corners.map(|p| p.coords);
+        // On a face of the other the winding number is a half: parts that touch from within are within.
+        surrounds(&((a + b + c) / 3.0).into(), SURROUNDED)
+            && corners.iter().all(|p| surrounds(p, SURROUNDED / 2.0))
+    })
+}
+
+/// How often a surface winds around a point, by the sum of the solid angles: whole off a closed surface.
+pub(super) fn surface_windings(
+    vertices: &[Point3<f64>],
+    triangles: &[[u32; 3]],
+    point: &Point3<f64>,
+) -> f64 {
+    let angles = triangles
+        .iter()
+        .map(|t| solid_angle(&t.map(|v| vertices[v as usize] - point)));
+    angles.sum::<f64>() / (4.0 * PI)
+}
+
+/// Parts that look the wrong way.
+#[derive(Debug, Default)]
+pub(super) struct WrongParts {
+    /// They should hold material.
+    pub(super) inverted: Vec<InvertedPart>,
+    /// They lie in an odd number of others, and should hold none.
+    pub(super) outward_walls: Vec<InvertedPart>,
+}
+
+/// The parts of a surface, open ones too, that look the wrong way, in the order of their first triangles. `adjacent` names the two triangles of each edge
+/// that has two, `borders` the edges that have one and their triangles, `unclear` the triangles at other edges. A part with one of
+/// those is not judged, nor is a sheet.
+pub(super) fn wrong_parts(
+    vertices: &[Point3<f64>],
+    triangles: &[[u32; 3]],
+    adjacent: impl Iterator<Item = [u32; 2]> + Clone,
+    borders: &[([u32; 2], u32)],
+    unclear: &[u32],
+) -> WrongParts {
+    let parts: Vec<Part> = connected(triangles.len(), adjacent)
+        .into_iter()
+        .map(|inside| measure(vertices, triangles, inside))
+        .collect();
+    let mut part_of = vec![0; triangles.len()];
+    for (index, part) in parts.iter().enumerate() {
+        part.triangles
+            .iter()
+            .for_each(|t| part_of[*t as usize] = index);
+    }
+    let mut openings: Vec<Vec<[u32; 2]>> = vec![Vec::new(); parts.len()];
+    for (edge, t) in borders {
+        openings[part_of[*t as usize]].push(*edge);
+    }
+    let mut judged = vec![true; parts.len()];
+    for t in unclear {
+        judged[part_of[*t as usize]] = false;
+    }
+    let mut wrong = WrongParts::default();
+    for (index, part) in parts.iter().enumerate().filter(|(index, _)| judged[*index]) {
+        let Some(volume) = closed_volume(vertices, triangles, part, &openings[index]) else {
+            continue;
+        };
+        let around = |other: &Part| encloses(vertices, triangles, other, part);
+        let depth = || {
+            let others = parts
+                .iter()
+                .enumerate()
+                .take_while(|_| parts.len() <= MOST_PARTS);
+            others
+                .filter(|(other, part)| *other != index && around(part))
+                .count()
+        };
+        let found = InvertedPart {
+            triangle: part.triangles[0],
+            triangles: part.triangles.len(),
+            center: nalgebra::center(&part.low, &part.high),
+            volume,
+        };
+        let outward = volume > 0.0; // false for NaN
+        let free = || {
+            let mut samples = sample_points(vertices, triangles, part);
+            samples.any(|p| winding_number(vertices, triangles, &parts, index, &p) < SURROUNDED)
+        };
+        if outward && depth() % 2 == 1 {
+            wrong.outward_walls.push(found);
+        } else if !outward && free() && depth() % 2 == 0 {
+            wrong.inverted.push(found);
+        }
+    }
+    wrong
+}
+
+/// The signed volume of a part whose openings are closed by one fan, m^3; `None` of a sheet. About the middle of its border, the fan adds none.
+fn closed_volume(
+    vertices: &[Point3<f64>],
+    triangles: &[[u32; 3]],
+    part: &Part,
+    opening: &[[u32; 2]],
+) -> Option<f64> {
+    if opening.is_empty() {
+        return Some(part.volume);
+    }
+    let at = |v: u32| vertices[v as usize];
+    let sum: Vector3<f64> = opening
+        .iter()
+        .map(|[a, b]| at(*a).coords + at(*b).coords)
+        .sum();
+    let middle = Point3::from(sum / (2 * opening.len()) as f64);
+    let fan: f64 = opening
+        .iter()
+        .map(|[a, b]| (at(*a) - middle).cross(&(at(*b) - middle)).norm())
+        .sum();
+    let (mut area, mut six_volumes) = (0.0, 0.0);
+    for t in &part.triangles {
+        let [a, b, c] = triangles[*t as usize].map(|v| at(v) - middle);
+        area += (b - a).cross(&(c - a)).norm();
+        six_volumes += a.dot(&b.cross(&c));
+    }
+    (fan <= MOST_OPEN * area).then_some(six_volumes / 6.0)
 }
 
 /// The parts that are inside out, in the order of their first triangles. `adjacent` names the two triangles of each edge of a closed, consistently

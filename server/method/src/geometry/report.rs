@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use nalgebra::{Point3, Vector3};
 
 use super::mesh::{face_normal, signed_volume};
-use super::parts::{InvertedPart, inverted_parts};
+use super::parts::{InvertedPart, wrong_parts};
 
 /// Findings about vertices and triangles as they come from a file. Works for meshes that [`Mesh`](super::Mesh) refuses.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,10 +16,13 @@ pub struct MeshReport {
     pub vertices: usize,
     /// Every edge has at least two triangles, and there is a triangle.
     pub watertight: bool,
-    /// Wherever two triangles share an edge they agree about outside, and every closed part has it outside.
+    /// Wherever two triangles share an edge they agree about outside, and every part that has an inside has it there.
     pub oriented: bool,
-    /// Closed parts that are inside out, no cavities of others; empty where the surface is not closed or does not agree about outside.
+    /// Parts that are inside out, no cavities of others. A part with holes counts as if they were closed; sheets, and parts that do not agree about
+    /// outside, are none.
     pub inverted_parts: Vec<InvertedPart>,
+    /// Parts that lie in an odd number of others and look outward, though they are walls of cavities.
+    pub outward_walls: Vec<InvertedPart>,
     /// Triangles without area, with an index out of range or with a corner that is not finite.
     pub degenerate_faces: usize,
     /// Triangles with the same three corners as an earlier one, in any order.
@@ -74,7 +77,7 @@ impl MeshReport {
             !seen.insert(corners)
         };
         let duplicates: Vec<&[u32; 3]> = sound.iter().filter(duplicate).collect();
-        let (sides, adjacent) = count_sides(&sound);
+        let sides = count_sides(&sound);
         let middle = |corners: &[u32]| {
             let sum: Vector3<f64> = corners.iter().map(|v| vertices[*v as usize].coords).sum();
             Point3::from(sum / corners.len() as f64)
@@ -82,16 +85,17 @@ impl MeshReport {
         let places = MeshPlaces {
             degenerate: named.iter().find(|t| !with_area(t)).map(|t| middle(t)),
             duplicate: duplicates.first().map(|t| middle(&t[..])),
-            border: sides.first_border.map(|edge| middle(&edge)),
+            border: sides.borders.first().map(|(edge, _)| middle(edge)),
             non_manifold: sides.first_crowded.map(|edge| middle(&edge)),
             misoriented: sides.first_misoriented.map(|edge| middle(&edge)),
         };
-        let closed = sides.border == 0 && sides.crowded == 0 && sides.misoriented == 0;
-        let inverted_parts = if closed {
-            inverted_parts(vertices, &sound, adjacent.into_iter())
-        } else {
-            Vec::new()
-        };
+        let wrong = wrong_parts(
+            vertices,
+            &sound,
+            sides.adjacent.iter().copied(),
+            &sides.borders,
+            &sides.unclear,
+        );
         let volume = if sound.is_empty() {
             0.0
         } else {
@@ -103,12 +107,16 @@ impl MeshReport {
         Self {
             triangles: triangles.len(),
             vertices: vertices.len(),
-            watertight: sides.border == 0 && !sound.is_empty(),
-            oriented: sides.misoriented == 0 && volume > 0.0 && inverted_parts.is_empty(),
-            inverted_parts,
+            watertight: sides.borders.is_empty() && !sound.is_empty(),
+            oriented: sides.misoriented == 0
+                && !sound.is_empty()
+                && wrong.inverted.is_empty()
+                && wrong.outward_walls.is_empty(),
+            inverted_parts: wrong.inverted,
+            outward_walls: wrong.outward_walls,
             degenerate_faces: triangles.len() - sound.len(),
             duplicate_faces: duplicates.len(),
-            border_edges: sides.border,
+            border_edges: sides.borders.len(),
             non_manifold_edges: sides.crowded,
             misoriented_edges: sides.misoriented,
             volume,
@@ -128,46 +136,49 @@ impl MeshReport {
 }
 
 #[derive(Default)]
-struct SideCounts {
-    border: usize,
+struct Sides {
     crowded: usize,
     misoriented: usize,
-    first_border: Option<[u32; 2]>,
     first_crowded: Option<[u32; 2]>,
     first_misoriented: Option<[u32; 2]>,
+    /// Edges with one triangle, and that triangle.
+    borders: Vec<([u32; 2], u32)>,
+    /// The two triangles at each edge that has two.
+    adjacent: Vec<[u32; 2]>,
+    /// Triangles at edges with more, or that do not agree there: what they bound is not known.
+    unclear: Vec<u32>,
 }
 
-/// What the edges are like, and the two triangles at each that has two.
-fn count_sides(triangles: &[[u32; 3]]) -> (SideCounts, Vec<[u32; 2]>) {
-    let mut sides: Vec<(u32, u32, bool, u32)> = triangles
+/// What the edges are like.
+fn count_sides(triangles: &[[u32; 3]]) -> Sides {
+    let mut all: Vec<(u32, u32, bool, u32)> = triangles
         .iter()
         .zip(0..)
         .flat_map(|(t, index)| (0..3).map(move |k| (t[k], t[(k + 1) % 3], index)))
         .map(|(from, to, index)| (from.min(to), from.max(to), from < to, index))
         .collect();
-    sides.sort_unstable();
-    let (mut counts, mut adjacent) = (SideCounts::default(), Vec::new());
-    for edge in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+    all.sort_unstable();
+    let mut sides = Sides::default();
+    for edge in all.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
         let ends = [edge[0].0, edge[0].1];
         match *edge {
-            [_] => {
-                counts.border += 1;
-                counts.first_border.get_or_insert(ends);
-            }
+            [one] => sides.borders.push((ends, one.3)),
             [a, b] => {
                 if a.2 == b.2 {
-                    counts.misoriented += 1;
-                    counts.first_misoriented.get_or_insert(ends);
+                    sides.misoriented += 1;
+                    sides.first_misoriented.get_or_insert(ends);
+                    sides.unclear.extend([a.3, b.3]);
                 }
-                adjacent.push([a.3, b.3]);
+                sides.adjacent.push([a.3, b.3]);
             }
             _ => {
-                counts.crowded += 1;
-                counts.first_crowded.get_or_insert(ends);
+                sides.crowded += 1;
+                sides.first_crowded.get_or_insert(ends);
+                sides.unclear.extend(edge.iter().map(|side| side.3));
             }
         }
     }
-    (counts, adjacent)
+    sides
 }
 
 /// Doubled area over the longest side.

@@ -1,5 +1,7 @@
 //! Whether a closed surface runs through itself. For set-up and checks.
 
+use std::ops::ControlFlow;
+
 use nalgebra::Point3;
 
 use super::distance::triangles_intersect;
@@ -14,13 +16,40 @@ const COORDINATE_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// Two triangles of the mesh that meet elsewhere than at corners and edges where both have vertices; `None` when there are none.
 pub fn self_intersection(mesh: &Mesh) -> Option<[u32; 2]> {
-    let count = mesh.triangles().len() as u32;
-    let mut stack = Vec::new();
-    (0..count).find_map(|a| partner(mesh, a, &mut stack).map(|b| [a, b]))
+    let mut found = None;
+    self_intersections(
+        mesh,
+        |_| {},
+        |pair| {
+            found = Some(pair);
+            ControlFlow::Break(())
+        },
+    );
+    found
 }
 
-/// A triangle after `a` that meets it elsewhere.
-fn partner(mesh: &Mesh, a: u32, stack: &mut Vec<u32>) -> Option<u32> {
+/// All of them, until `visit` has enough. `done` is told after each triangle how many there were.
+pub(super) fn self_intersections(
+    mesh: &Mesh,
+    mut done: impl FnMut(usize),
+    mut visit: impl FnMut([u32; 2]) -> ControlFlow<()>,
+) {
+    let mut stack = Vec::new();
+    for a in 0..mesh.triangles().len() as u32 {
+        if partners(mesh, a, &mut stack, &mut visit).is_break() {
+            return;
+        }
+        done(a as usize + 1);
+    }
+}
+
+/// The triangles after `a` that meet it elsewhere.
+fn partners(
+    mesh: &Mesh,
+    a: u32,
+    stack: &mut Vec<u32>,
+    visit: &mut impl FnMut([u32; 2]) -> ControlFlow<()>,
+) -> ControlFlow<()> {
     let nodes = mesh.tree().nodes();
     let corners = mesh.corners(a);
     let (low, high) = (
@@ -38,10 +67,10 @@ fn partner(mesh: &Mesh, a: u32, stack: &mut Vec<u32>) -> Option<u32> {
         if !node.is_leaf() {
             stack.extend([node.second, i + 1]);
         } else if node.triangle > a && meet_elsewhere(mesh, a, node.triangle) {
-            return Some(node.triangle);
+            visit([a, node.triangle])?;
         }
     }
-    None
+    ControlFlow::Continue(())
 }
 
 fn meet_elsewhere(mesh: &Mesh, a: u32, b: u32) -> bool {

@@ -2,110 +2,133 @@
 
 use std::path::Path;
 
-use god_object::Mesh;
-
-use super::report::{FileKind, FileReport, MeshFigures};
+use super::bodies::{doubt_in_file, look_at};
+use super::lengths::length_text;
+use super::report::{FileKind, FileReport};
+use super::surface::judge;
 use crate::appearance::Appearance;
 use crate::document::{Document, Value};
 use crate::fidelity::FidelityPlan;
 use crate::files::{MAX_TOML_BYTES, read_text};
-use crate::mesh_file::{is_mesh_path, read_mesh_and_look};
+use crate::import::LengthUnit;
+use crate::mesh_file::{is_gltf_path, is_mesh_path, read_part};
 use crate::problem::{FileError, Problem};
-use crate::scene::{GOD_OBJECT_NAME, Scene, mesh_faults, shipped_scene_text};
+use crate::scene::{BuiltScene, GOD_OBJECT_NAME, Scene, file_faults, shipped_scene_text};
 use crate::trace::DeviceTrace;
 use crate::workbench::Workbench;
-
-/// A body longer than this, m, is probably in millimetres; a shorter one was probably scaled twice.
-pub(crate) const SUSPICIOUS_SIZES: [f64; 2] = [5e-4, 5.0];
 
 /// Reads each file and says everything that is wrong with it. The kind follows from the ending and, for .toml, from the
 /// tables. Names of shipped scenes are taken too.
 pub fn check<P: AsRef<Path>>(paths: &[P]) -> Vec<FileReport> {
-    paths.iter().map(|path| check_one(path.as_ref())).collect()
+    check_in(paths, None)
 }
 
-fn check_one(path: &Path) -> FileReport {
+/// The same, with meshes whose format names no unit in this one; without one they are in metres, which is noted.
+pub fn check_in<P: AsRef<Path>>(paths: &[P], unit: Option<LengthUnit>) -> Vec<FileReport> {
+    let one = |path: &P| check_one(path.as_ref(), unit);
+    paths.iter().map(one).collect()
+}
+
+/// What was found, as it comes together.
+#[derive(Default)]
+struct Found {
+    summary: String,
+    problems: Vec<Problem>,
+    notes: Vec<String>,
+    fidelity: Option<FidelityPlan>,
+}
+
+impl Found {
+    fn fault(error: impl Into<FileError>) -> Self {
+        Self {
+            problems: error.into().into_problems(),
+            ..Self::default()
+        }
+    }
+
+    fn of(self, path: &Path, kind: FileKind) -> FileReport {
+        FileReport {
+            file: path.display().to_string(),
+            kind,
+            summary: self.summary,
+            problems: self.problems,
+            notes: self.notes,
+            mesh: None,
+            fidelity: self.fidelity,
+        }
+    }
+}
+
+fn check_one(path: &Path, unit: Option<LengthUnit>) -> FileReport {
     let extension = path
         .extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase())
         .unwrap_or_default();
     let name = path.to_string_lossy();
     if is_mesh_path(path) {
-        check_mesh(path)
+        check_mesh(path, unit)
     } else if extension == "csv" {
-        let trace = DeviceTrace::load(path).map(|trace| {
-            let (count, duration) = (trace.samples().len(), trace.duration());
-            (format!("trace, {count} samples, {duration} s"), None)
-        });
-        report(path, FileKind::Trace, trace)
+        let found = match DeviceTrace::load(path) {
+            Ok(trace) => Found {
+                summary: format!(
+                    "trace, {} samples, {} s",
+                    trace.samples().len(),
+                    trace.duration()
+                ),
+                ..Found::default()
+            },
+            Err(error) => Found::fault(error),
+        };
+        found.of(path, FileKind::Trace)
     } else if extension == "toml" {
         check_toml(path)
     } else if shipped_scene_text(&name).is_some() {
-        report(
-            path,
-            FileKind::Scene,
-            Scene::named_or_file(&name).and_then(|scene| summarise_scene(&scene, &mut Vec::new())),
-        )
+        let mut found = Found::default();
+        add_scene(Scene::named_or_file(&name), &mut found);
+        found.of(path, FileKind::Scene)
     } else {
-        let text = "is no file that taut knows; use .toml (scene, workbench), .csv (trace), .ply, .obj, .stl, .glb or .gltf";
-        report(
-            path,
-            FileKind::Unknown,
-            Err(Problem::of_file(path.display(), text).into()),
-        )
+        let text = if path.is_dir() {
+            "is a directory; name the files in it"
+        } else {
+            "is no file that taut knows; use .toml (scene, workbench), .csv (trace), .ply, .obj, .stl, .glb or .gltf"
+        };
+        Found::fault(Problem::of_file(path.display(), text)).of(path, FileKind::Unknown)
     }
 }
 
-fn report(
-    path: &Path,
-    kind: FileKind,
-    outcome: Result<(String, Option<FidelityPlan>), FileError>,
-) -> FileReport {
-    let ((summary, fidelity), problems) = match outcome {
-        Ok(found) => (found, Vec::new()),
-        Err(error) => ((String::new(), None), error.into_problems()),
+fn check_mesh(path: &Path, unit: Option<LengthUnit>) -> FileReport {
+    let part = match read_part(path, &[]) {
+        Ok(part) => part,
+        Err(error) => return Found::fault(error).of(path, FileKind::Mesh),
     };
-    FileReport {
-        file: path.display().to_string(),
-        kind,
-        summary,
-        problems,
-        notes: Vec::new(),
-        mesh: None,
-        fidelity,
-    }
-}
-
-fn check_mesh(path: &Path) -> FileReport {
-    let (mesh, look) = match read_mesh_and_look(path) {
-        Ok(read) => read,
-        Err(error) => return report(path, FileKind::Mesh, Err(error)),
-    };
-    let figures = MeshFigures::of(&mesh);
-    let lost = look.not_drawn(&Appearance::default(), &mesh);
-    let mut faults: Vec<String> = figures.faults().iter().map(ToString::to_string).collect();
-    if let Err(error) = Mesh::new(mesh.vertices, mesh.triangles)
-        && faults.is_empty()
-    {
-        faults.push(error.to_string());
-    }
-    let problems = faults
-        .into_iter()
-        .map(|text| Problem::of_file(path.display(), text))
-        .collect();
+    let is_gltf = is_gltf_path(path);
+    let metres = unit.filter(|_| !is_gltf).map_or(1.0, |unit| unit.metres);
+    let name = path.display().to_string();
+    let lost = part.look.not_drawn(&Appearance::default(), &part.mesh);
+    let judged = judge(part.mesh.scaled(metres), &name);
+    let figures = judged.figures;
     let longest = figures.size_m.iter().copied().fold(0.0, f64::max);
-    let mut notes = Vec::new();
-    notes.extend(doubt_about_size("the mesh", longest));
+    let mut notes = judged.notes;
+    notes.extend(doubt_in_file(is_gltf, unit, longest));
+    notes.extend(part.pieces.left_out().iter().cloned());
+    let pieces = part.pieces.names().len();
+    if pieces > 1 {
+        notes.push(format!(
+            "its {pieces} pieces are one body: {}; `only` beside mesh in a scene, or `taut import --only`, chooses some",
+            part.pieces.listed()
+        ));
+    }
     notes.extend(lost.map(|lost| format!("of its look is not drawn: {lost}")));
-    let summary = figures.to_string();
-    FileReport {
-        file: path.display().to_string(),
-        kind: FileKind::Mesh,
-        summary,
-        problems,
+    let of_file = |text| Problem::of_file(path.display(), text);
+    let found = Found {
+        summary: figures.to_string(),
+        problems: judged.faults.into_iter().map(of_file).collect(),
         notes,
-        mesh: Some(figures),
         fidelity: None,
+    };
+    FileReport {
+        mesh: Some(figures),
+        ..found.of(path, FileKind::Mesh)
     }
 }
 
@@ -116,28 +139,27 @@ fn check_toml(path: &Path) -> FileReport {
         .and_then(|text| Document::parse(&name, &text));
     let document = match document {
         Ok(document) => document,
-        Err(error) => return report(path, FileKind::Unknown, Err(error)),
+        Err(error) => return Found::fault(error).of(path, FileKind::Unknown),
     };
     let has = |keys: &[&str]| match &document.root.value {
         Value::Table(entries) => entries.iter().any(|(key, _)| keys.contains(&key.as_str())),
         _ => false,
     };
+    let mut found = Found::default();
     if has(&["god_object", "obstacle", "coupling", "limits", "hand"]) {
-        let mut notes = Vec::new();
-        let scene = match Scene::load(path) {
-            Ok(scene) => summarise_scene(&scene, &mut notes),
-            Err(error) => {
-                // The meshes are judged all the same: one run tells everything.
-                let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
-                let mut problems = error.into_problems();
-                problems.extend(mesh_faults(&document, &directory));
-                Err(FileError::of_all(problems))
+        match Scene::load(path) {
+            Ok(scene) => {
+                found.problems.extend(scene.hand_fault());
+                add_scene(Ok(scene), &mut found);
             }
-        };
-        FileReport {
-            notes,
-            ..report(path, FileKind::Scene, scene)
+            Err(error) => {
+                // The files are judged all the same: one run tells everything.
+                found.problems = error.into_problems();
+                let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
+                found.problems.extend(file_faults(&document, &directory));
+            }
         }
+        found.of(path, FileKind::Scene)
     } else if has(&[
         "screen",
         "node",
@@ -146,79 +168,65 @@ fn check_toml(path: &Path) -> FileReport {
         "monitoring",
         "realtime",
     ]) {
-        let mut notes = Vec::new();
-        let workbench = Workbench::load(path).and_then(|workbench| {
-            notes = workbench.notes();
-            let faults = workbench.screen_faults();
-            if !faults.is_empty() {
-                return Err(FileError::of_all(faults));
-            }
-            let scene = workbench.load_scene()?;
-            for other in workbench.scenes() {
-                Scene::named_or_file(other)?;
-            }
-            let (inner, fidelity) = summarise_scene(&scene, &mut notes)?;
-            let (screens, nodes) = (workbench.screens.len(), workbench.nodes.len());
-            let summary = format!(
-                "workbench \"{}\", {screens} screens, {nodes} nodes, {inner}",
-                workbench.name
-            );
-            Ok((summary, fidelity))
-        });
-        FileReport {
-            notes,
-            ..report(path, FileKind::Workbench, workbench)
-        }
+        add_workbench(path, &document, &mut found);
+        found.of(path, FileKind::Workbench)
     } else {
         let text = "is neither a scene (it has no [god_object]) nor a workbench (it has no [[screen]]); compare it with the shipped examples";
-        report(
-            path,
-            FileKind::Unknown,
-            Err(Problem::of_file(path.display(), text).into()),
-        )
+        Found::fault(Problem::of_file(path.display(), text)).of(path, FileKind::Unknown)
     }
 }
 
-/// A length of m in um, with a digit even where it is far below one.
-fn micrometres(length: f64) -> String {
-    match length * 1e6 {
-        um @ 1e-2.. => format!("{um:.3}"),
-        um => format!("{um:.1e}"),
-    }
-}
-
-/// What to ask about the longest side of a body, m, where it is none that a hand can hold.
-fn doubt_about_size(body: &str, longest: f64) -> Option<String> {
-    let [least, most] = SUSPICIOUS_SIZES;
-    let advice = if longest > most {
-        "if the file is in millimetres, write unit = \"mm\" beside mesh in the scene"
-    } else if longest < least {
-        "if the file is in metres, write no unit and no scale beside mesh in the scene"
-    } else {
-        return None;
+fn add_workbench(path: &Path, document: &Document, found: &mut Found) {
+    let workbench = match Workbench::load(path) {
+        Ok(workbench) => workbench,
+        Err(error) => {
+            found.problems = error.into_problems();
+            // The scene is judged all the same.
+            if let Some(Value::Text(scene)) = document.root.child("scene").map(|node| &node.value)
+                && shipped_scene_text(scene).is_none()
+            {
+                let beside = path.with_file_name(scene);
+                add_scene(Scene::load(&beside), found);
+                found.summary.clear();
+            }
+            return;
+        }
     };
-    Some(format!(
-        "the longest side of {body} is {longest:.3e} m; {advice}"
-    ))
-}
-
-fn summarise_scene(
-    scene: &Scene,
-    notes: &mut Vec<String>,
-) -> Result<(String, Option<FidelityPlan>), FileError> {
-    let built = scene.build()?;
-    let mut sizes = Vec::new();
-    for body in &built.bodies {
-        let Some((low, high)) = body.mesh.bounds() else {
-            continue;
-        };
-        let longest = (high - low).max();
-        if scene.is_from_file(&body.name) {
-            sizes.push(format!("{} {longest:.4} m", body.name));
-            notes.extend(doubt_about_size(&body.name, longest));
+    found.notes = workbench.notes();
+    found.problems = workbench.screen_faults();
+    for other in workbench.scenes() {
+        if other != workbench.scene
+            && let Err(error) = Scene::named_or_file(other)
+        {
+            found.problems.extend(error.into_problems());
         }
     }
-    notes.extend(built.lost_looks.iter().cloned());
+    add_scene(workbench.load_scene(), found);
+    if !found.summary.is_empty() {
+        let (screens, nodes) = (workbench.screens.len(), workbench.nodes.len());
+        found.summary = format!(
+            "workbench \"{}\", {screens} screens, {nodes} nodes, {}",
+            workbench.name, found.summary
+        );
+    }
+}
+
+/// Builds a scene and adds what is found.
+fn add_scene(scene: Result<Scene, FileError>, found: &mut Found) {
+    let built = scene.and_then(|scene| scene.build().map(|built| (scene, built)));
+    let (scene, built) = match built {
+        Ok(both) => both,
+        Err(error) => return found.problems.extend(error.into_problems()),
+    };
+    let bodies = look_at(&scene, &built);
+    found.problems.extend(bodies.problems);
+    found.notes.extend(bodies.notes);
+    found.notes.extend(built.lost_looks.iter().cloned());
+    found.summary = summary(&built, &bodies.sizes);
+    found.fidelity = built.fidelity;
+}
+
+fn summary(built: &BuiltScene, sizes: &[String]) -> String {
     let triangles: Vec<String> = built
         .bodies
         .iter()
@@ -251,9 +259,9 @@ fn summarise_scene(
     }
     let settings = &built.settings;
     summary += &format!(
-        ", rest distance {} um (fits down to {} um a side; for tighter ones give clearance in [method])",
-        micrometres(settings.rest_distance),
-        micrometres(settings.least_clearance())
+        ", rest distance {} (fits down to {} a side; for tighter ones give clearance in [method])",
+        length_text(settings.rest_distance),
+        length_text(settings.least_clearance())
     );
     if !exact.is_empty() {
         summary += &format!(", exact: {}", exact.join(", "));
@@ -261,5 +269,5 @@ fn summarise_scene(
     for simplified in &built.simplified {
         summary += &format!("; {simplified}");
     }
-    Ok((summary, built.fidelity))
+    summary
 }

@@ -6,6 +6,8 @@ use god_object::geometry::{InvertedPart, MeshPlaces, MeshReport};
 use nalgebra::Point3;
 use serde::Serialize;
 
+use super::lengths::{place_text, size_text};
+use super::surface::Meeting;
 use crate::fidelity::FidelityPlan;
 use crate::mesh_file::RawMesh;
 use crate::problem::Problem;
@@ -61,7 +63,7 @@ pub struct MeshFigures {
     pub vertices: usize,
     /// Every edge has at least two triangles.
     pub watertight: bool,
-    /// Triangles agree about outside, and it is outside.
+    /// Triangles agree about outside, and it is outside of every part that has an inside.
     pub oriented: bool,
     /// Triangles without area.
     pub degenerate_faces: usize,
@@ -73,8 +75,12 @@ pub struct MeshFigures {
     pub non_manifold_edges: usize,
     /// Edges along which two triangles disagree about outside.
     pub misoriented_edges: usize,
-    /// Closed parts that are inside out, no cavities of others.
+    /// Parts that are inside out, no cavities of others.
     pub inverted_parts: Vec<InvertedPartFigures>,
+    /// Parts that lie in an odd number of others, and look outward.
+    pub outward_walls: Vec<InvertedPartFigures>,
+    /// Where the surface meets itself; none if it does not, or if it was not looked for.
+    pub meeting: Option<Meeting>,
     /// m^3, negative if inside out.
     pub volume_m3: f64,
     /// Least height of a triangle, m; absent if none has an area.
@@ -113,14 +119,14 @@ impl FaultPlaces {
     }
 }
 
-/// A closed part of a mesh that is inside out.
+/// A part of a mesh that looks the wrong way.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct InvertedPartFigures {
     /// Number of its triangles.
     pub triangles: usize,
     /// Middle of the box around it, m.
     pub center_m: [f64; 3],
-    /// m^3, negative.
+    /// m^3, negative where it looks inward.
     pub volume_m3: f64,
 }
 
@@ -155,6 +161,12 @@ impl MeshFigures {
                 .iter()
                 .map(InvertedPartFigures::of)
                 .collect(),
+            outward_walls: report
+                .outward_walls
+                .iter()
+                .map(InvertedPartFigures::of)
+                .collect(),
+            meeting: None,
             volume_m3: report.volume,
             smallest_feature_m: Some(report.smallest_feature).filter(|height| height.is_finite()),
             size_m: size,
@@ -217,11 +229,25 @@ impl MeshFigures {
                 format!("the surface is inside out (volume {volume} m^3)")
             } else {
                 format!(
-                    "the closed part of {} triangles about {} is inside out (volume {volume} m^3)",
+                    "the {} of {} triangles about {} is inside out (volume {volume} m^3)",
+                    if self.watertight {
+                        "closed part"
+                    } else {
+                        "part"
+                    },
                     part.triangles,
                     place_text(&part.center_m.into())
                 )
             };
+            faults.push(MeshFault { what, remedy: TURN });
+        }
+        for part in &self.outward_walls {
+            let what = format!(
+                "the part of {} triangles about {} lies within another and looks outward, though it is the wall of a cavity (volume {} m^3, counted twice)",
+                part.triangles,
+                place_text(&part.center_m.into()),
+                part.volume_m3
+            );
             faults.push(MeshFault { what, remedy: TURN });
         }
         faults
@@ -240,20 +266,6 @@ impl fmt::Display for MeshFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}; {}", self.what, self.remedy)
     }
-}
-
-/// The sides of a box, m: four decimals, and the digits of a side too thin for them.
-pub(crate) fn size_text(sides: [f64; 3]) -> String {
-    let [x, y, z] = sides.map(|side| match side {
-        1e-3.. => format!("{side:.4}"),
-        _ => format!("{side:.3e}"),
-    });
-    format!("{x} x {y} x {z} m")
-}
-
-/// A place as messages show it.
-pub(crate) fn place_text(place: &Point3<f64>) -> String {
-    format!("({:.5}, {:.5}, {:.5}) m", place.x, place.y, place.z)
 }
 
 impl fmt::Display for FileReport {

@@ -2,7 +2,6 @@
 //!
 //! Every repair moves a point by at most a stated distance, or is refused. What cannot be repaired is said with its place; nothing is written then.
 
-mod crossing;
 mod edges;
 mod faces;
 mod folder;
@@ -10,6 +9,7 @@ mod hand_path;
 mod holes;
 mod manifold;
 mod orientation;
+mod part;
 mod placing;
 mod repair;
 mod report;
@@ -19,9 +19,8 @@ mod stitch;
 mod unit;
 mod weld;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use god_object::Mesh;
 use nalgebra::Point3;
 
 pub use holes::MAX_HOLE_EDGES;
@@ -29,18 +28,14 @@ pub use placing::UpAxis;
 pub use report::{Finding, ImportReport, PartReport};
 pub use unit::LengthUnit;
 
-use crate::appearance::Appearance;
-use crate::check::{MeshFigures, place_text};
-use crate::mesh_file::{RawMesh, read_mesh_and_look, write_ply};
+use crate::check::place_text;
+use crate::mesh_file::write_ply;
 use crate::problem::{FileError, Problem};
-use crate::progress::Progress;
 use crate::scene::{GOD_OBJECT_NAME, RESERVED_NAMES, Scene};
-use crate::simplify::simplify;
 use folder::NewFolder;
 use hand_path::hand_path;
-use placing::{move_to_origin, note_up, upright};
-use repair::{Repaired, Wishes, is_single, repair};
-use report::Places;
+use part::{Part, new_name, part};
+use placing::{move_to_origin, note_up};
 use scene_text::{HAND_SECTION, Placed, around, clear_above, scene_text, sphere_radius};
 
 /// Name of the scene file in the folder.
@@ -69,6 +64,8 @@ pub struct ImportRequest {
     pub name: Option<String>,
     /// All parts stand, and a sphere is in the hand.
     pub obstacles_only: bool,
+    /// Nodes, objects or groups that are taken of each file that names any; none takes all.
+    pub only: Vec<String>,
 }
 
 /// Reads, repairs and writes. All faults of all parts are reported; with any, nothing is written.
@@ -86,14 +83,33 @@ pub fn import_unless(
     let mut problems = Vec::new();
     let mut names = RESERVED_NAMES.map(str::to_owned).to_vec();
     let mut parts = Vec::new();
+    let mut names_found = vec![false; request.only.len()];
     for (index, path) in request.parts.iter().enumerate() {
         let own = new_name(path, &mut names);
         let held = index == 0 && !request.obstacles_only;
         let body = if held { GOD_OBJECT_NAME } else { &own };
         match part(path, body, &format!("{own}.ply"), request) {
-            Ok(part) => parts.push(part),
+            Ok(Part {
+                report,
+                mesh,
+                pieces,
+            }) => {
+                for (found, name) in names_found.iter_mut().zip(&request.only) {
+                    *found |= pieces.has(name);
+                }
+                parts.push((report, mesh));
+            }
             Err(error) => problems.extend(error.into_problems()),
         }
+    }
+    if problems.is_empty() {
+        let missing = names_found.iter().zip(&request.only);
+        problems.extend(missing.filter(|(found, _)| !**found).map(|(_, name)| {
+            let text = format!(
+                "no part has a node, object or group \"{name}\"; `taut check` lists those of a file"
+            );
+            Problem::of_file("--only", text)
+        }));
     }
     FileError::unless_empty(problems)?;
     let mut notes = Vec::new();
@@ -142,117 +158,6 @@ pub fn import_unless(
     folder.write("import.txt", format!("{report}\n").as_bytes())?;
     folder.finish()?;
     Ok(report)
-}
-
-/// A name for the body and its file, from the name of the part's: unique, and of characters that are the same everywhere.
-fn new_name(path: &Path, taken: &mut Vec<String>) -> String {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let plain: String = stem
-        .chars()
-        .map(|c| {
-            if c.is_ascii_alphanumeric() || c == '_' {
-                c
-            } else {
-                '-'
-            }
-        })
-        .take(64)
-        .collect();
-    let plain = match plain.trim_matches('-') {
-        "" => "part".to_owned(),
-        name => name.to_owned(),
-    };
-    let mut name = plain.clone();
-    let mut number = 2;
-    // Names that differ in case only are one file on some systems.
-    while taken.iter().any(|other| other.eq_ignore_ascii_case(&name)) {
-        name = format!("{plain}-{number}");
-        number += 1;
-    }
-    taken.push(name.clone());
-    name
-}
-
-/// One part, read, repaired and simplified.
-fn part(
-    path: &Path,
-    body: &str,
-    mesh_file: &str,
-    request: &ImportRequest,
-) -> Result<(PartReport, RawMesh), FileError> {
-    // A vertex of no triangle is no part of the surface, however far away it is.
-    let (raw, look) = read_mesh_and_look(path)?;
-    let raw = raw.without_unused();
-    let fail = |text: String| FileError::from(Problem::of_file(path.display(), text));
-    let (unit, unit_assumed) = unit::unit_of(path, &raw, request.unit).map_err(fail)?;
-    let single = is_single(&raw.vertices);
-    let (file, count) = (path.display(), raw.triangles.len());
-    let progress = Progress::on_triangles(count, format_args!("{file}: mending {count} triangles"));
-    let wishes = Wishes {
-        close_holes: request.close_holes,
-        thicken: request.thicken,
-    };
-    let Repaired {
-        mesh,
-        findings,
-        moved,
-        thickened,
-    } = repair(raw.scaled(unit.metres), single, wishes).map_err(|faults| {
-        let of_file = |text| Problem::of_file(path.display(), text);
-        FileError::of_all(faults.into_iter().map(of_file).collect())
-    })?;
-    drop(progress);
-    let (mesh, simplified) = match request.simplify {
-        Some(max_error) => {
-            let (mesh, outcome) = simplify(mesh, max_error, body);
-            (mesh, Some(outcome))
-        }
-        None => (mesh, None),
-    };
-    let count = mesh.triangles().len();
-    let progress = Progress::on_triangles(
-        count,
-        format_args!("{file}: looking where {count} triangles run through each other"),
-    );
-    let crossing = crossing::crossing(&mesh);
-    drop(progress);
-    let raw = upright(raw_of(&mesh), request.up);
-    let mut report = PartReport {
-        file: path.display().to_string(),
-        body: body.to_owned(),
-        mesh_file: mesh_file.to_owned(),
-        unit: unit.name,
-        unit_assumed,
-        findings,
-        moved_m: moved,
-        thickened_m: thickened,
-        simplified_m: None,
-        appearance: look.appearance,
-        mesh: MeshFigures::of(&raw),
-    };
-    if let Some(outcome) = &simplified {
-        report.simplified(outcome);
-    }
-    if let Some(place) = crossing {
-        report.findings.push(Finding::new(
-            "meets-itself",
-            &Places::of(1, Some(place)),
-            "NOT MENDED: the surface touches or runs through itself; its mass counts what overlaps twice, and the force inside is not defined",
-        ));
-    }
-    if let Some(lost) = look.not_drawn(&Appearance::default(), &RawMesh::default()) {
-        let text = format!("of its look is not drawn: {lost}");
-        let finding = Finding::new("look-lost", &Places::default(), text);
-        report.findings.push(finding);
-    }
-    Ok((report, raw))
-}
-
-fn raw_of(mesh: &Mesh) -> RawMesh {
-    RawMesh {
-        vertices: mesh.vertices().to_vec(),
-        triangles: mesh.triangles().to_vec(),
-    }
 }
 
 /// Writes the scene with the held body where its file puts it or, where it would touch the others, above them.

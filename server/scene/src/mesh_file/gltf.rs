@@ -12,6 +12,7 @@ use nalgebra::{Matrix4, Point3};
 use percent_encoding::percent_decode_str;
 
 use super::material::{Material, Materials};
+use super::pieces::Pieces;
 use super::read::{below, finite_vertex};
 use super::{Fault, RawMesh};
 use crate::appearance::Appearance;
@@ -22,13 +23,14 @@ const MAX_NODE_DEPTH: usize = 64;
 /// Most nodes visited. A node may hang below several parents.
 const MAX_NODES: usize = 100_000;
 
-/// The mesh; which material each triangle has goes to `materials`.
+/// The mesh; which material each triangle has goes to `materials`, of which nodes it is to `pieces`.
 pub(super) fn parse(
     bytes: &[u8],
     directory: Option<&Path>,
     materials: &mut Materials,
+    pieces: &mut Pieces,
 ) -> Result<RawMesh, Fault> {
-    parse_with(bytes, directory, materials, None).map(RawMesh::welded)
+    parse_with(bytes, directory, (materials, pieces), None).map(RawMesh::welded)
 }
 
 /// Texture coordinates of every triangle that [`parse`] gives, in its order. v runs down the picture, as it does in the file.
@@ -37,8 +39,8 @@ pub(super) fn parse_texture_coordinates(
     directory: Option<&Path>,
 ) -> Result<Vec<CornerCoordinates>, Fault> {
     let mut coordinates = Vec::new();
-    let materials = &mut Materials::default();
-    parse_with(bytes, directory, materials, Some(&mut coordinates))?;
+    let told = (&mut Materials::default(), &mut Pieces::default());
+    parse_with(bytes, directory, told, Some(&mut coordinates))?;
     Ok(coordinates)
 }
 
@@ -46,7 +48,7 @@ pub(super) fn parse_texture_coordinates(
 fn parse_with(
     bytes: &[u8],
     directory: Option<&Path>,
-    materials: &mut Materials,
+    (materials, pieces): (&mut Materials, &mut Pieces),
     mut coordinates: Option<&mut Vec<CornerCoordinates>>,
 ) -> Result<RawMesh, Fault> {
     let file = validated(bytes)?;
@@ -55,43 +57,37 @@ fn parse_with(
     let Some(scene) = file.default_scene().or_else(|| file.scenes().next()) else {
         return Err(Fault::new("has no scene; export it with one"));
     };
+    let others = file.scenes().filter(|other| other.index() != scene.index());
+    pieces.left_out.extend(others.map(|other| {
+        format!(
+            "scene {} \"{}\" of the file is left out: only its default scene is read",
+            other.index(),
+            other.name().unwrap_or("unnamed")
+        )
+    }));
     let mut mesh = RawMesh::default();
-    let mut pending: Vec<_> = scene
-        .nodes()
-        .map(|node| (node, Matrix4::identity(), 0))
-        .collect();
+    let mut pending: Vec<_> = scene.nodes().map(Placed::root).collect();
     pending.reverse();
     let mut visited = 0;
-    while let Some((node, world_from_parent, depth)) = pending.pop() {
+    while let Some(placed) = pending.pop() {
+        let node = &placed.node;
         visited += 1;
-        if depth > MAX_NODE_DEPTH || visited > MAX_NODES {
+        if placed.depth > MAX_NODE_DEPTH || visited > MAX_NODES {
             return Err(Fault::new(format!(
                 "node {} lies too deep or in a loop; flatten the scene",
                 node.index()
             )));
         }
-        let parent_from_node = Matrix4::from(node.transform().matrix()).cast::<f64>();
-        let world_from_node = world_from_parent * parent_from_node;
         if let Some(of_node) = node.mesh() {
-            if is_morphed(&node, &of_node) {
-                return Err(Fault::new(format!(
-                    "mesh {} has morph targets with weights, which are not applied; apply its shape keys, and export it without morph targets",
-                    of_node.index()
-                )));
-            }
-            if node.skin().is_some() {
-                return Err(Fault::new(format!(
-                    "mesh {} has a skin, which is not applied; apply the armature, and export it again",
-                    of_node.index()
-                )));
-            }
+            posed_as_it_is(node, &of_node)?;
+            pieces.begin(placed.names());
             for primitive in of_node.primitives() {
                 let before = mesh.triangles.len();
                 append(
                     &mut mesh,
                     coordinates.as_deref_mut(),
                     &primitive,
-                    &world_from_node,
+                    &placed.world_from_node,
                     &buffers,
                 )
                 .map_err(|text| {
@@ -103,15 +99,75 @@ fn parse_with(
                 })?;
                 let count = mesh.triangles.len() - before;
                 materials.push(primitive.material().index(), count);
+                pieces.grow(count);
                 materials.vertex_colours |= primitive.get(&gltf::Semantic::Colors(0)).is_some();
             }
         }
-        pending.extend(
-            node.children()
-                .map(|child| (child, world_from_node, depth + 1)),
-        );
+        pending.extend(placed.children());
     }
     Ok(mesh)
+}
+
+/// A node of the tree, and where it is.
+struct Placed<'f> {
+    node: gltf::Node<'f>,
+    world_from_node: Matrix4<f64>,
+    depth: usize,
+    /// Names of the nodes that it hangs below.
+    names_above: Vec<String>,
+}
+
+impl<'f> Placed<'f> {
+    fn root(node: gltf::Node<'f>) -> Self {
+        Self {
+            world_from_node: transform(&node),
+            node,
+            depth: 0,
+            names_above: Vec::new(),
+        }
+    }
+
+    fn children(&self) -> impl Iterator<Item = Self> {
+        let mut names_above = self.names_above.clone();
+        names_above.extend(self.node.name().map(str::to_owned));
+        self.node.children().map(move |child| Self {
+            world_from_node: self.world_from_node * transform(&child),
+            node: child,
+            depth: self.depth + 1,
+            names_above: names_above.clone(),
+        })
+    }
+
+    /// Its own, else its mesh's, else its number; then its mesh's and those above.
+    fn names(&self) -> Vec<String> {
+        let mesh = self.node.mesh();
+        let of_mesh = mesh.as_ref().and_then(gltf::Mesh::name);
+        let own = self.node.name().or(of_mesh).map(str::to_owned);
+        let mut names = vec![own.unwrap_or_else(|| format!("node {}", self.node.index()))];
+        names.extend(of_mesh.map(str::to_owned));
+        names.extend(self.names_above.iter().cloned());
+        names
+    }
+}
+
+fn transform(node: &gltf::Node<'_>) -> Matrix4<f64> {
+    Matrix4::from(node.transform().matrix()).cast::<f64>()
+}
+
+/// Refuses vertices that are not where the mesh has them.
+fn posed_as_it_is(node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>) -> Result<(), Fault> {
+    let number = mesh.index();
+    if is_morphed(node, mesh) {
+        return Err(Fault::new(format!(
+            "mesh {number} has morph targets with weights, which are not applied; apply its shape keys, and export it without morph targets"
+        )));
+    }
+    if node.skin().is_some() {
+        return Err(Fault::new(format!(
+            "mesh {number} has a skin, which is not applied; apply the armature, and export it again"
+        )));
+    }
+    Ok(())
 }
 
 /// Whether the vertices are not where the mesh has them. A node's weights count before its mesh's.
@@ -162,6 +218,16 @@ fn validated(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
     };
     let root = gltf::json::deserialize::from_slice::<gltf::json::Root>(json)
         .map_err(|e| invalid(gltf::Error::Deserialize(e)))?;
+    if let Some(compression) = root
+        .extensions_used
+        .iter()
+        .chain(&root.extensions_required)
+        .find_map(|name| compression(name))
+    {
+        return Err(Fault::new(format!(
+            "has meshes that are compressed with {compression}, which is not read; export it without {compression} compression"
+        )));
+    }
     let positions = Checked::Valid(gltf::Semantic::Positions);
     let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let mut named = primitives.filter_map(|primitive| primitive.attributes.get(&positions));
@@ -177,6 +243,15 @@ fn validated(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
         document: gltf::Document::from_json(root).map_err(invalid)?,
         blob: blob.map(<[u8]>::to_vec),
     })
+}
+
+/// The compression that an extension is, if it is one.
+fn compression(extension: &str) -> Option<&'static str> {
+    match extension {
+        "KHR_draco_mesh_compression" => Some("Draco"),
+        "EXT_meshopt_compression" | "KHR_meshopt_compression" => Some("meshopt"),
+        _ => None,
+    }
 }
 
 /// First bytes of a GLB container.

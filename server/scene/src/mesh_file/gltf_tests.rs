@@ -3,7 +3,12 @@
 use super::*;
 
 fn parse(bytes: &[u8], directory: Option<&Path>) -> Result<RawMesh, Fault> {
-    super::parse(bytes, directory, &mut Materials::default())
+    super::parse(
+        bytes,
+        directory,
+        &mut Materials::default(),
+        &mut Pieces::default(),
+    )
 }
 
 /// One triangle in a data URI; indices in the first 8 bytes, positions after.

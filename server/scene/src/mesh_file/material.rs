@@ -89,6 +89,15 @@ impl Materials {
         }
     }
 
+    /// Those of the triangles that are `chosen`, in the mesh's order.
+    pub(super) fn keep(&mut self, chosen: &[bool]) {
+        let mut chosen = chosen.iter();
+        for (material, count) in std::mem::take(&mut self.runs) {
+            let kept = chosen.by_ref().take(count).filter(|kept| **kept).count();
+            self.push(material, kept);
+        }
+    }
+
     /// Reads the libraries that lie in `directory`; then how the body looks.
     pub(super) fn look(mut self, mesh: &RawMesh, directory: Option<&Path>) -> FileLook {
         let mut lost = Vec::new();

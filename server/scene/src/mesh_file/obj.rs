@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use god_object::surface::CornerCoordinates;
 
 use super::material::{Material, Materials};
+use super::pieces::Pieces;
 use super::polygon::{Polygons, triangles};
 use super::read::{finite_vertex, without_mark};
 use super::{Fault, RawMesh};
@@ -13,13 +14,18 @@ use super::{Fault, RawMesh};
 /// Most corners of one face. More is a broken line.
 const MAX_FACE_CORNERS: usize = 10_000;
 
-/// The mesh; which material each face names goes to `materials`.
-pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, Fault> {
+/// The mesh; which material each face names goes to `materials`, its object and groups to `pieces`.
+pub(super) fn parse(
+    bytes: &[u8],
+    materials: &mut Materials,
+    pieces: &mut Pieces,
+) -> Result<RawMesh, Fault> {
     let text = String::from_utf8_lossy(without_mark(bytes)); // names in comments and groups may be in any encoding
     let mut mesh = RawMesh::default();
     let (mut polygons, mut faces) = (Polygons::default(), 0);
     let mut places: HashMap<String, usize> = HashMap::new();
     let mut material = None;
+    let (mut object, mut groups) = (Vec::new(), Vec::new());
     // Faces may name vertices that come later: remember the line, check at the end.
     let mut first_line_of_largest = (0u32, 0usize);
     for (number, line) in lines(&text) {
@@ -46,6 +52,16 @@ pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, 
                 faces += 1;
                 polygons.push(&mut mesh, &corners, faces, Some(number));
                 materials.push(material, corners.len() - 2);
+                pieces.grow(corners.len() - 2);
+            }
+            // What was said last is the piece's own name: some programs write groups into objects, others the other way round.
+            Some(key @ "o") => {
+                object = vec![named(&line, key).to_owned()];
+                pieces.begin([&object[..], &groups].concat());
+            }
+            Some("g") => {
+                groups = words.map(str::to_owned).collect();
+                pieces.begin([&groups[..], &object].concat());
             }
             // Names may hold blanks.
             Some(key @ "usemtl") => {
@@ -277,7 +293,7 @@ mod tests {
     use super::*;
 
     fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
-        super::parse(bytes, &mut Materials::default())
+        super::parse(bytes, &mut Materials::default(), &mut Pieces::default())
     }
 
     #[test]
@@ -302,7 +318,7 @@ mod tests {
         ];
         assert_eq!(super::libraries(text.as_bytes()), libraries);
         let mut materials = Materials::default();
-        assert!(super::parse(text.as_bytes(), &mut materials).is_ok());
+        assert!(super::parse(text.as_bytes(), &mut materials, &mut Pieces::default()).is_ok());
         assert_eq!(materials.libraries, libraries);
         let names: Vec<&str> = materials.list.iter().map(|one| one.name.as_str()).collect();
         assert_eq!(names, ["steel", "Material #25"]);

@@ -3,6 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use super::material::{FileLook, Materials};
+use super::pieces::Pieces;
 use super::{RawMesh, gltf, obj, ply, stl};
 use crate::files::{MAX_MESH_BYTES, read_bytes};
 use crate::problem::{FileError, Problem};
@@ -70,12 +71,38 @@ pub fn read_mesh(path: &Path) -> Result<RawMesh, FileError> {
     read_mesh_bytes(path, &mesh_bytes(path)?)
 }
 
-/// The same, and how the file says that its body looks: a material that cannot be read is no fault of the mesh.
-pub(crate) fn read_mesh_and_look(path: &Path) -> Result<(RawMesh, FileLook), FileError> {
+/// A mesh, or chosen pieces of it, and what else its file says.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct MeshPart {
+    pub(crate) mesh: RawMesh,
+    pub(crate) look: FileLook,
+    /// Of the whole file.
+    pub(crate) pieces: Pieces,
+}
+
+/// The pieces of a mesh that have one of the names in `only`, all with none, and how the file says that they look: a material that cannot be read is no
+/// fault of the mesh. At least one of the names must be there.
+pub(crate) fn read_part(path: &Path, only: &[String]) -> Result<MeshPart, FileError> {
     let bytes = mesh_bytes(path)?;
-    let (mesh, materials) = parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path))?;
+    let Parsed {
+        mut mesh,
+        mut materials,
+        pieces,
+    } = parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path))?;
+    if !only.is_empty() {
+        let chosen = pieces.chosen(only);
+        if !chosen.contains(&true) {
+            let text = pieces.no_such(&only[0]);
+            return Err(Problem::of_file(path.display(), text).into());
+        }
+        let mut is_chosen = chosen.iter();
+        mesh.triangles
+            .retain(|_| is_chosen.next().is_some_and(|chosen| *chosen));
+        mesh = mesh.without_unused();
+        materials.keep(&chosen);
+    }
     let look = materials.look(&mesh, path.parent());
-    Ok((mesh, look))
+    Ok(MeshPart { mesh, look, pieces })
 }
 
 /// Names of the files that this mesh file is read with, relative to its folder, be they there or not: libraries of materials, buffers.
@@ -100,41 +127,70 @@ pub(super) fn below(name: &str) -> Option<PathBuf> {
 }
 
 fn mesh_bytes(path: &Path) -> Result<Vec<u8>, Problem> {
-    if !is_mesh_path(path) {
-        let text = "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf";
+    if path.is_dir() {
+        let text = "is a directory, but a mesh file is needed; name the files in it";
         return Err(Problem::of_file(path.display(), text));
+    }
+    if !is_mesh_path(path) {
+        return Err(Problem::of_file(path.display(), unknown_format(path)));
     }
     read_bytes(path, MAX_MESH_BYTES)
 }
 
 /// The same from bytes that are there already; `path` gives the format, the name in messages and where a .gltf finds its buffers.
 pub fn read_mesh_bytes(path: &Path, bytes: &[u8]) -> Result<RawMesh, FileError> {
-    let (mesh, _) = parse_mesh(path, bytes).map_err(|fault| fault.in_file(path))?;
-    Ok(mesh)
+    let parsed = parse_mesh(path, bytes).map_err(|fault| fault.in_file(path))?;
+    Ok(parsed.mesh)
 }
 
-fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<(RawMesh, Materials), Fault> {
-    let mut materials = Materials::default();
+/// Why a file of this name is not read.
+fn unknown_format(path: &Path) -> &'static str {
+    match extension(path).as_str() {
+        "step" | "stp" | "iges" | "igs" => {
+            "holds surfaces as formulas (STEP, IGES), which are not read; export the part as STL, OBJ or glTF from the CAD program, with the tolerance that may be felt (FreeCAD: Mesh Design, Meshes, Create mesh from shape, then File, Export)"
+        }
+        _ => "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf",
+    }
+}
+
+/// What a file holds.
+struct Parsed {
+    mesh: RawMesh,
+    materials: Materials,
+    pieces: Pieces,
+}
+
+fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<Parsed, Fault> {
+    let (mut materials, mut pieces) = (Materials::default(), Pieces::default());
     let mesh = match extension(path).as_str() {
         "ply" => {
             materials.vertex_colours = ply::has_colours(bytes, "vertex");
             materials.face_colours = ply::has_colours(bytes, "face");
             ply::parse(bytes)
         }
-        "obj" => obj::parse(bytes, &mut materials),
+        "obj" => obj::parse(bytes, &mut materials, &mut pieces),
         "stl" => {
             materials.face_colours = stl::has_colours(bytes);
-            stl::parse(bytes)
+            stl::parse(bytes, &mut pieces)
         }
-        "glb" | "gltf" => gltf::parse(bytes, path.parent(), &mut materials),
-        _ => Err(Fault::new(
-            "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf",
-        )),
+        "glb" | "gltf" => gltf::parse(bytes, path.parent(), &mut materials, &mut pieces),
+        _ => Err(Fault::new(unknown_format(path))),
     }?;
     if mesh.triangles.is_empty() {
-        return Err(Fault::new("has no faces; export it as a triangle mesh"));
+        let points = mesh.vertices.len();
+        return Err(Fault::new(if points > 0 {
+            format!(
+                "has no faces, only {points} points: point clouds are not taken; reconstruct a surface from them first (in MeshLab: Filters, Remeshing, Screened Poisson), and export that"
+            )
+        } else {
+            "has no faces; export it as a triangle mesh".to_owned()
+        }));
     }
-    Ok((mesh, materials))
+    Ok(Parsed {
+        mesh,
+        materials,
+        pieces,
+    })
 }
 
 /// A vertex with finite coordinates, or which coordinate is not. `number` counts from 0, as the formats' indices do.
@@ -183,7 +239,7 @@ mod tests {
             let bytes = [HEADS[head].as_bytes(), &tail].concat();
             for name in ["a.ply", "a.obj", "a.stl", "a.glb", "a.gltf"] {
                 for bytes in [&bytes, &tail] {
-                    let _ = parse_mesh(Path::new(name), bytes).map(|(mesh, materials)| materials.look(&mesh, None));
+                    let _ = parse_mesh(Path::new(name), bytes).map(|read| read.materials.look(&read.mesh, None));
                 }
             }
         }
@@ -194,7 +250,7 @@ mod tests {
             let place = place % bytes.len();
             bytes[place] = value;
             bytes.truncate(bytes.len().saturating_sub(cut % 3));
-            if let Ok((mesh, _)) = parse_mesh(Path::new("a.ply"), &bytes) {
+            if let Ok(Parsed { mesh, .. }) = parse_mesh(Path::new("a.ply"), &bytes) {
                 prop_assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < mesh.vertices.len()));
                 prop_assert!(mesh.vertices.iter().all(|v| v.iter().all(|c| c.is_finite())));
             }
@@ -215,7 +271,7 @@ mod tests {
         ] {
             let text = format!("mtllib {named}\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
             std::fs::write(&path, text).unwrap();
-            let (_, look) = read_mesh_and_look(&path).unwrap();
+            let look = read_part(&path, &[]).unwrap().look;
             let red = is_beside.then_some([1.0, 0.0, 0.0]);
             assert_eq!(
                 (look.appearance.color, look.lost.is_empty()),
@@ -229,8 +285,8 @@ mod tests {
     #[test]
     fn colours_of_faces_are_said_not_to_be_drawn() {
         let lost = |name: &str, bytes: &[u8]| {
-            let (mesh, materials) = parse_mesh(Path::new(name), bytes).unwrap();
-            materials.look(&mesh, None).lost
+            let read = parse_mesh(Path::new(name), bytes).unwrap();
+            read.materials.look(&read.mesh, None).lost
         };
         let plain = [&[0_u8; 80][..], &[1, 0, 0, 0], &[0; 50]].concat();
         assert_eq!(lost("a.stl", &plain), [""; 0]);
@@ -256,10 +312,20 @@ mod tests {
             text.starts_with("nowhere/a.ply: cannot be opened ("),
             "{text}"
         );
-        let text = read_mesh(Path::new("a.step")).unwrap_err().to_string();
+        let text = read_mesh(Path::new("a.fbx")).unwrap_err().to_string();
         assert_eq!(
             text,
-            "a.step: is no known mesh format; use .ply, .obj, .stl, .glb or .gltf"
+            "a.fbx: is no known mesh format; use .ply, .obj, .stl, .glb or .gltf"
         );
+        for name in ["a.step", "a.STP", "a.iges", "a.igs"] {
+            let text = read_mesh(Path::new(name)).unwrap_err().to_string();
+            assert!(
+                text.contains("export the part as STL, OBJ or glTF"),
+                "{text}"
+            );
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let text = read_mesh(folder.path()).unwrap_err().to_string();
+        assert!(text.contains("is a directory"), "{text}");
     }
 }

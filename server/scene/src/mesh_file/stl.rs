@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::io::Cursor;
 
+use super::pieces::Pieces;
 use super::read::{finite_vertex, is_blank, without_mark};
 use super::{Fault, RawMesh};
 
@@ -10,11 +11,15 @@ use super::{Fault, RawMesh};
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
 
-pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
+/// The mesh; the solids of a text go to `pieces`.
+pub(super) fn parse(bytes: &[u8], pieces: &mut Pieces) -> Result<RawMesh, Fault> {
     let mut mesh = RawMesh::default();
     if is_text(bytes) {
         for solid in solids(bytes)? {
-            append(solid.as_bytes(), &mut mesh)?;
+            let before = mesh.triangles.len();
+            append(solid.text.as_bytes(), &mut mesh)?;
+            pieces.begin(solid.name.into_iter().collect());
+            pieces.grow(mesh.triangles.len() - before);
         }
     } else {
         let mut bytes = Cow::from(bytes);
@@ -57,28 +62,43 @@ fn is_text(bytes: &[u8]) -> bool {
     }) && !bytes.contains(&0)
 }
 
+/// A solid of a text.
+struct Solid {
+    /// What follows the word `solid`.
+    name: Option<String>,
+    text: String,
+}
+
 /// The solids of a text, each for itself, without its name and its normals and in small letters: the crate reads to the first `endsolid`, and no capitals.
-fn solids(bytes: &[u8]) -> Result<Vec<String>, Fault> {
-    let text = String::from_utf8_lossy(without_mark(bytes)).to_ascii_lowercase();
-    let mut solids: Vec<String> = Vec::new();
-    let mut open: Option<String> = None;
-    for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
+fn solids(bytes: &[u8]) -> Result<Vec<Solid>, Fault> {
+    let written = String::from_utf8_lossy(without_mark(bytes));
+    let text = written.to_ascii_lowercase();
+    let mut solids: Vec<Solid> = Vec::new();
+    let mut open: Option<Solid> = None;
+    for (index, (line, as_written)) in text.lines().zip(written.lines()).enumerate() {
+        let number = index + 1;
         let mut words = line.split_whitespace();
         let Some(word) = words.next() else {
             continue;
         };
         let is_facet = word == "facet" && words.next() == Some("normal") && words.count() == 3;
         match (word, &mut open) {
-            ("solid", None) => open = Some("solid \n".to_owned()),
+            ("solid", None) => {
+                let name = as_written.trim_start().get("solid".len()..).map(str::trim);
+                open = Some(Solid {
+                    name: name.filter(|name| !name.is_empty()).map(str::to_owned),
+                    text: "solid \n".to_owned(),
+                });
+            }
             ("endsolid", Some(solid)) => {
-                solid.push_str("endsolid\n");
+                solid.text.push_str("endsolid\n");
                 solids.extend(open.take());
             }
             // The corners say it; of a triangle without area some programs write what is no number.
-            (_, Some(solid)) if is_facet => solid.push_str("facet normal 0 0 0\n"),
+            (_, Some(solid)) if is_facet => solid.text.push_str("facet normal 0 0 0\n"),
             (_, Some(solid)) => {
-                solid.push_str(line);
-                solid.push('\n');
+                solid.text.push_str(line);
+                solid.text.push('\n');
             }
             (_, None) => {
                 let text = format!("`{word}` stands outside of any `solid`; repair the line");
@@ -146,6 +166,10 @@ fn broken_triangle(number: usize, bytes: &[u8], error: &std::io::Error) -> Strin
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
+        super::parse(bytes, &mut Pieces::default())
+    }
 
     fn binary(count: u32, coordinates: &[f32]) -> Vec<u8> {
         let mut bytes = vec![0; 80];

@@ -126,7 +126,12 @@ impl Scene {
         problems: &mut Vec<Problem>,
     ) -> Vec<Option<Texture>> {
         let of_one = |(o, mesh): (&ObstacleSpec, &Option<Mesh>)| {
-            let (map, mesh) = (o.height_map.as_ref()?, mesh.as_ref()?);
+            let map = o.height_map.as_ref()?;
+            let Some(mesh) = mesh else {
+                // Told with what is wrong with the mesh: one run tells everything.
+                problems.extend(self.height_map_file(map).err());
+                return None;
+            };
             self.height_map(map, &o.shape, mesh)
                 .map_err(|error| problems.extend(error.into_problems()))
                 .ok()
@@ -308,9 +313,12 @@ impl Scene {
     fn raw_mesh(&self, shape: &Shape, at: &At) -> Result<(RawMesh, FileLook), FileError> {
         let mesh = match *shape {
             Shape::Mesh {
-                ref path, scale, ..
+                ref path,
+                ref only,
+                scale,
+                ..
             } => {
-                let (mesh, look) = self.mesh_file(path, at)?;
+                let (mesh, look) = self.mesh_file(path, only, at)?;
                 return Ok((mesh.scaled(scale), look));
             }
             Shape::Sphere {

@@ -1,9 +1,12 @@
 //! Loading a scene by file or by name.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use god_object::{HeightMapTexture, Mesh, Texture, TextureCoordinates, UvHeightMapTexture};
+use god_object::{
+    HeightMap, HeightMapTexture, Mesh, Texture, TextureCoordinates, UvHeightMapTexture,
+};
 use taut_proto::Panorama;
 
 use super::built::GOD_OBJECT_NAME;
@@ -13,23 +16,17 @@ use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};
 use super::spec::{
     BodySpec, HandPathSpec, HeightMapMapping, HeightMapSpec, ObstacleSpec, ScenerySpec, Shape, View,
 };
-use crate::check::MeshFigures;
-use crate::document::{At, Document, Node, Value};
+use crate::document::{At, Document};
 use crate::environment_file::read_environment;
 use crate::files::{MAX_TOML_BYTES, data_dirs, read_text};
 use crate::height_map_file::read_height_map;
-use crate::mesh_file::{
-    FileLook, RawMesh, read_mesh, read_mesh_and_look, read_texture_coordinates,
-};
+use crate::mesh_file::{FileLook, RawMesh, read_part, read_texture_coordinates};
 use crate::problem::{FileError, Problem};
-use crate::trace::DeviceTrace;
-
-/// Most mesh files of a faulty document that are read.
-const MAX_FAULTY_MESHES: usize = 100;
+use crate::trace::{DeviceTrace, looping_fault_of};
 
 /// Where a scene's own files are looked for first.
 #[derive(Clone, Debug, PartialEq)]
-enum Origin {
+pub(super) enum Origin {
     /// Beside this file.
     Directory(PathBuf),
     /// Among the files that are shipped in the program.
@@ -65,15 +62,13 @@ impl Scene {
         Self::parse(&path.display().to_string(), &text, &directory)
     }
 
-    /// Whether the body of this name among the bodies has its form from a mesh file.
-    pub(crate) fn is_from_file(&self, body: &str) -> bool {
-        let shape = if body == GOD_OBJECT_NAME {
-            Some(&self.spec.god_object.shape)
-        } else {
-            let mut obstacles = self.spec.obstacles.iter();
-            obstacles.find(|o| o.name == body).map(|o| &o.shape)
-        };
-        matches!(shape, Some(Shape::Mesh { .. }))
+    /// The bodies that are touched and have their form from mesh files: name, form, and where the scene says so.
+    pub(crate) fn bodies_from_files(&self) -> impl Iterator<Item = (&str, &Shape, &At)> {
+        let held = &self.spec.god_object;
+        let obstacles = self.spec.obstacles.iter();
+        std::iter::once((GOD_OBJECT_NAME, &held.shape, &held.shape_at))
+            .chain(obstacles.map(|o| (o.name.as_str(), &o.shape, &o.shape_at)))
+            .filter(|(_, shape, _)| shape.file().is_some())
     }
 
     /// One of [`SHIPPED_SCENES`] by its name, or else the file of this path.
@@ -223,19 +218,46 @@ impl Scene {
         self.trace(&hand.path, &hand.at).map(Some)
     }
 
+    /// Why the simulated hand cannot follow its path; `None` where it can, or where the path cannot be read.
+    pub fn hand_fault(&self) -> Option<Problem> {
+        let hand = self.spec.hand.as_ref().filter(|hand| hand.repeat)?;
+        let (file, text) = self.trace_text(&hand.path, &hand.at).ok()?;
+        looping_fault_of(&file, &text)
+    }
+
     /// The trace of this name, as written in the scene.
     pub(super) fn trace(&self, name: &str, at: &At) -> Result<DeviceTrace, FileError> {
+        let (file, text) = self.trace_text(name, at)?;
+        DeviceTrace::parse(&file, &text)
+    }
+
+    /// Name in messages and text of a trace.
+    fn trace_text(&self, name: &str, at: &At) -> Result<(String, Cow<'static, str>), Problem> {
         if let (Origin::Shipped, Some(text)) = (&self.origin, shipped_file(name)) {
-            return DeviceTrace::parse(name, text);
+            return Ok((name.to_owned(), text.into()));
         }
         let path = self.locate(name, at)?;
         let text = read_text(&path, taut_recording::MAX_TRACE_BYTES)?;
-        DeviceTrace::parse(&path.display().to_string(), &text)
+        Ok((path.display().to_string(), text.into()))
     }
 
-    /// The mesh file of this name, as written in the scene, and how it says that its body looks.
-    pub(super) fn mesh_file(&self, name: &str, at: &At) -> Result<(RawMesh, FileLook), FileError> {
-        read_mesh_and_look(&self.locate(name, at)?)
+    /// The mesh file of this name, or some pieces of it, as written in the scene, and how it says that its body looks.
+    pub(super) fn mesh_file(
+        &self,
+        name: &str,
+        only: &[String],
+        at: &At,
+    ) -> Result<(RawMesh, FileLook), FileError> {
+        let part = read_part(&self.locate(name, at)?, only)?;
+        match only.iter().find(|piece| !part.pieces.has(piece)) {
+            Some(piece) => Err(unusable(at, name, part.pieces.no_such(piece)).into()),
+            None => Ok((part.mesh, part.look)),
+        }
+    }
+
+    /// The picture of a height map.
+    pub(super) fn height_map_file(&self, spec: &HeightMapSpec) -> Result<HeightMap, Problem> {
+        read_height_map(&self.locate(&spec.path, &spec.at)?)
     }
 
     /// The texture of a height map, its picture read and laid on this shape with this mesh.
@@ -245,7 +267,7 @@ impl Scene {
         shape: &Shape,
         mesh: &Mesh,
     ) -> Result<Texture, FileError> {
-        let map = Arc::new(read_height_map(&self.locate(&spec.path, &spec.at)?)?);
+        let map = Arc::new(self.height_map_file(spec)?);
         let amplitude = spec.amplitude;
         let tile = match spec.mapping {
             HeightMapMapping::Triplanar { tile } => tile,
@@ -271,13 +293,17 @@ impl Scene {
         shape: &Shape,
         mesh: &Mesh,
     ) -> Result<TextureCoordinates, FileError> {
-        let Shape::Mesh {
-            path,
-            simplify: None,
-            ..
-        } = shape
-        else {
-            let text = "mapping = \"uv\" needs the texture coordinates of a mesh file, as it is; name one without `simplify`, or use mapping = \"triplanar\"";
+        let whole = match shape {
+            Shape::Mesh {
+                path,
+                simplify: None,
+                only,
+                ..
+            } if only.is_empty() => Some(path),
+            _ => None,
+        };
+        let Some(path) = whole else {
+            let text = "mapping = \"uv\" needs the texture coordinates of a mesh file, as it is; name one without `simplify` and `only`, or use mapping = \"triplanar\"";
             return Err(spec.at.problem(text).into());
         };
         let coordinates = read_texture_coordinates(&self.locate(path, &spec.at)?)?;
@@ -337,45 +363,14 @@ impl Scene {
     }
 }
 
-/// Everything that is wrong with the mesh files of a document that is no scene for other reasons. Nothing else of it is looked at.
-pub(crate) fn mesh_faults(document: &Document, directory: &Path) -> Vec<Problem> {
-    let origin = Origin::Directory(directory.to_path_buf());
-    let root = &document.root;
-    let obstacles = root.child("obstacle").map_or(&[][..], Node::items);
-    let bodies = root.child("god_object").into_iter().chain(obstacles);
-    let mut seen: Vec<&str> = Vec::new();
-    let mut problems = Vec::new();
-    for node in bodies.filter_map(|body| body.child("shape")?.child("mesh")) {
-        let Value::Text(name) = &node.value else {
-            continue; // said where the document was read
-        };
-        if seen.contains(&name.as_str()) || seen.len() >= MAX_FAULTY_MESHES {
-            continue;
-        }
-        seen.push(name);
-        let mesh = origin
-            .locate(name, &node.at)
-            .map_err(FileError::from)
-            .and_then(|path| read_mesh(&path));
-        match mesh {
-            Ok(mesh) => {
-                let faults = MeshFigures::of(&mesh).faults();
-                problems.extend(faults.iter().map(|fault| unusable(&node.at, name, fault)));
-            }
-            Err(error) => problems.extend(error.into_problems()),
-        }
-    }
-    problems
-}
-
 /// A complaint about a mesh that a scene names.
-pub(super) fn unusable(at: &At, mesh: &str, why: impl std::fmt::Display) -> Problem {
+pub(crate) fn unusable(at: &At, mesh: &str, why: impl std::fmt::Display) -> Problem {
     at.problem(format!("the mesh \"{mesh}\" cannot be used: {why}"))
 }
 
 impl Origin {
     /// Beside the scene, else in a data directory.
-    fn locate(&self, name: &str, at: &At) -> Result<PathBuf, Problem> {
+    pub(super) fn locate(&self, name: &str, at: &At) -> Result<PathBuf, Problem> {
         let mut places = Vec::new();
         if let Self::Directory(directory) = self {
             places.push(directory.join(name));

@@ -63,9 +63,10 @@ pub(super) fn appearance(body: &Section<'_>) -> Appearance {
     }
 }
 
-/// `"#rrggbb"`, sRGB, or `[r, g, b]`, linear.
+/// `"#rrggbb"` or a name of CSS, sRGB, or `[r, g, b]`, linear.
 fn color(body: &Section<'_>) -> Option<[f32; 3]> {
-    const WANTED: &str = "\"#rrggbb\", or [r, g, b] with numbers between 0 and 1";
+    const WANTED: &str =
+        "\"#rrggbb\", a CSS name such as \"red\", or [r, g, b] with numbers between 0 and 1";
     let node = body.get("color")?;
     match &node.value {
         Value::Array(_) => {

@@ -70,6 +70,8 @@ fn shape_of(body: &Section<'_>, key: &'static str) -> Option<Shape> {
         found.push(Some(Shape::Mesh {
             path: path.to_owned(),
             scale,
+            is_scaled: shape.has("unit") || shape.has("scale"),
+            only: only(&shape),
             simplify: simplify(&shape),
         }));
     }
@@ -105,6 +107,22 @@ fn shape_of(body: &Section<'_>, key: &'static str) -> Option<Shape> {
     } else {
         None
     }
+}
+
+/// `only = ["name"]`: which pieces of the file.
+fn only(shape: &Section<'_>) -> Vec<String> {
+    let Some(names) = shape.texts("only") else {
+        return Vec::new();
+    };
+    if names.is_empty() {
+        let at = shape.get("only").map_or(shape.at(), |node| &node.at);
+        let text = format!(
+            "`only` in {} names no piece; write names of nodes, objects or groups, as only = [\"peg\"], or leave it out",
+            shape.name()
+        );
+        shape.complain(at, text);
+    }
+    names.into_iter().map(|(name, _)| name.to_owned()).collect()
 }
 
 /// `simplify = { max_error }`: the most distance, m.

@@ -20,6 +20,10 @@ pub enum Shape {
         path: String,
         /// Factor on all coordinates: that of the unit, m, times the scale.
         scale: f64,
+        /// Whether the scene names a unit or a scale.
+        is_scaled: bool,
+        /// Nodes, objects or groups of the file that are the shape; none is all of it.
+        only: Vec<String>,
         /// Most distance to the mesh in the file, either way, m; the mesh gets as few triangles as that allows.
         simplify: Option<f64>,
     },
