@@ -356,6 +356,29 @@ fn import_makes_a_scene_or_says_what_to_write() {
         error.contains("write one of m, dm, cm, mm, um, inch"),
         "{error}"
     );
+    for option in ["--thicken", "--simplify"] {
+        let negative = taut(&["import", &part, "--out", &out, option, "-1"]);
+        let error = String::from_utf8_lossy(&negative.stderr).into_owned();
+        assert!(
+            error.contains(option) && error.contains("metres"),
+            "{error}"
+        );
+    }
+    let metres = taut(&["check", &part]);
+    let millimetres = taut(&["check", &part, "--unit", "mm"]);
+    for (output, size) in [
+        (metres, "30.0000 x 30.0000"),
+        (millimetres, "0.0300 x 0.0300"),
+    ] {
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(text.contains(size), "{text}");
+    }
+    refused(
+        &[
+            "import", &part, "--out", &out, "--unit", "mm", "--only", "pin",
+        ],
+        &["no part has a node, object or group \"pin\""],
+    );
     let output = taut(&["import", &part, "--out", &out, "--unit", "mm", "--json"]);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
     assert_eq!(
@@ -382,7 +405,7 @@ fn a_preview_that_cannot_be_is_refused_before_anything_is_written() {
     let place = Workplace::new();
     place.write(
         "bad.toml",
-        "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { sphere = { radius = 0.01 } }\ncolor = \"red\"\n",
+        "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { sphere = { radius = 0.01 } }\ncolor = \"redd\"\n",
     );
     let (bad, out) = (place.text("bad.toml"), place.text("out.png"));
     let nowhere = place.text("nowhere/out.png");
@@ -390,7 +413,7 @@ fn a_preview_that_cannot_be_is_refused_before_anything_is_written() {
         &["preview", &bad, "--out", &out],
         &[
             "bad.toml:5",
-            "`color` in [god_object] is \"red\"",
+            "`color` in [god_object] is \"redd\"",
             "#rrggbb",
         ],
     );

@@ -49,8 +49,9 @@ fn encoded(light: f64) -> f64 {
 /// The colour that `#rrggbb` or a name of CSS says; `None` if the text is none.
 pub(crate) fn colour_of_text(text: &str) -> Option<[f32; 3]> {
     let Some(digits) = text.strip_prefix('#') else {
-        // Letters only: of CSS the names are taken, and no functions.
-        let is_name = text.bytes().all(|letter| letter.is_ascii_alphabetic());
+        // Of CSS the names are taken, and no functions; the crate takes digits without `#`, too, and no name is made of those.
+        let is_name = text.bytes().all(|letter| letter.is_ascii_alphabetic())
+            && !text.bytes().all(|letter| letter.is_ascii_hexdigit());
         let named = csscolorparser::parse(text).ok().filter(|_| is_name)?;
         let parts = [named.r, named.g, named.b];
         let is_opaque = named.a >= 1.0; // `transparent` is no colour

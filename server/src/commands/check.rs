@@ -186,6 +186,35 @@ mod tests {
         );
     }
 
+    #[test]
+    fn a_hand_that_does_not_return_is_told_with_the_line_of_its_path() {
+        let path = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.05,1,0,0,0\n1,0,0,0.02,1,0,0,0\n";
+        let files = tempfile::tempdir().expect("a folder");
+        let open = files.path().join("open.csv");
+        assert!(std::fs::write(&open, path).is_ok());
+        let named = format!("path = \"{}\"", open.display());
+        let in_scene = format!(
+            "{SCENE}[hand]\npath = \"{}\"\nloop = true\n",
+            open.display()
+        );
+        for (scene, changes) in [
+            (
+                SCENE,
+                &[NAMES_SCENE, ("# path = \"my-hand.csv\"", named.as_str())][..],
+            ),
+            (&in_scene, &[NAMES_SCENE]),
+        ] {
+            let told = faults(scene, changes);
+            let [told] = &told[..] else {
+                panic!("{told:?}");
+            };
+            assert!(
+                told.starts_with("./workbench.toml:") && told.contains("open.csv:3: "),
+                "{told}"
+            );
+        }
+    }
+
     /// A session logs them when it starts; whoever checks before wants to know, too.
     #[test]
     fn what_a_session_warns_of_is_a_note() {

@@ -9,6 +9,8 @@
 //! nearest to its middle, as seen across the piece: what is over that triangle is bounded by it, the rest goes on. Where that is not enough, it is cut in four.
 //! Strips narrower than [`STRIP`] are left out: they lie that near to a neighbour, and the bound grows by as much.
 
+use std::collections::VecDeque;
+
 use arrayvec::ArrayVec;
 use nalgebra::{Point3, Vector3};
 
@@ -64,7 +66,7 @@ pub fn one_sided_distance(
         decided: limit * (1.0 - f64::from(MAX_PIECES) * STRIP) - rounding,
         at_most: 0.0,
         at_least: 0.0,
-        pieces: Vec::new(),
+        pieces: VecDeque::new(),
         strips: 0,
     };
     let mut guess = 0;
@@ -99,7 +101,8 @@ struct OneSided<'a> {
     decided: f64,
     at_most: f64,
     at_least: f64,
-    pieces: Vec<Piece>,
+    /// What is left of a triangle, the largest pieces first: a point beyond the limit is met before the pieces where the distance is just the limit.
+    pieces: VecDeque<Piece>,
     /// Most strips left out of one triangle.
     strips: u32,
 }
@@ -112,9 +115,9 @@ impl OneSided<'_> {
 
     fn triangle(&mut self, corners: Piece, normal: &Vector3<f64>) {
         self.pieces.clear();
-        self.pieces.push(corners);
+        self.pieces.push_back(corners);
         let (mut seen, mut strips, mut guess) = (0, 0, 0);
-        while let Some(piece) = self.pieces.pop() {
+        while let Some(piece) = self.pieces.pop_front() {
             if self.has_given_up() {
                 return;
             }

@@ -28,6 +28,11 @@ pub(crate) fn size_text(sides: [f64; 3]) -> String {
 
 /// A place as messages show it.
 pub(crate) fn place_text(place: &Point3<f64>) -> String {
+    // In a part of micrometres five decimals would all be zero.
+    let is_small = place.iter().all(|c| c.abs() < 1e-3) && place.iter().any(|c| *c != 0.0);
+    if is_small {
+        return format!("({:.3e}, {:.3e}, {:.3e}) m", place.x, place.y, place.z);
+    }
     format!("({:.5}, {:.5}, {:.5}) m", place.x, place.y, place.z)
 }
 

@@ -222,7 +222,14 @@ impl MeshFigures {
                 remedy,
             })
             .collect();
+        faults.extend(self.wrong_parts());
+        faults
+    }
+
+    /// Parts that look the wrong way.
+    fn wrong_parts(&self) -> Vec<MeshFault> {
         const TURN: &str = "turn its triangles around, as `taut import` does";
+        let mut faults = Vec::new();
         for part in &self.inverted_parts {
             let volume = part.volume_m3;
             let what = if part.triangles == self.triangles {

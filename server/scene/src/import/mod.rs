@@ -29,7 +29,7 @@ pub use report::{Finding, ImportReport, PartReport};
 pub use unit::LengthUnit;
 
 use crate::check::place_text;
-use crate::mesh_file::write_ply;
+use crate::mesh_file::{RawMesh, write_ply};
 use crate::problem::{FileError, Problem};
 use crate::scene::{GOD_OBJECT_NAME, RESERVED_NAMES, Scene};
 use folder::NewFolder;
@@ -80,38 +80,7 @@ pub fn import_unless(
 ) -> Result<ImportReport, FileError> {
     // What cannot be made is refused before the work; nothing is there while it lasts.
     drop(NewFolder::create(&request.folder)?);
-    let mut problems = Vec::new();
-    let mut names = RESERVED_NAMES.map(str::to_owned).to_vec();
-    let mut parts = Vec::new();
-    let mut names_found = vec![false; request.only.len()];
-    for (index, path) in request.parts.iter().enumerate() {
-        let own = new_name(path, &mut names);
-        let held = index == 0 && !request.obstacles_only;
-        let body = if held { GOD_OBJECT_NAME } else { &own };
-        match part(path, body, &format!("{own}.ply"), request) {
-            Ok(Part {
-                report,
-                mesh,
-                pieces,
-            }) => {
-                for (found, name) in names_found.iter_mut().zip(&request.only) {
-                    *found |= pieces.has(name);
-                }
-                parts.push((report, mesh));
-            }
-            Err(error) => problems.extend(error.into_problems()),
-        }
-    }
-    if problems.is_empty() {
-        let missing = names_found.iter().zip(&request.only);
-        problems.extend(missing.filter(|(found, _)| !**found).map(|(_, name)| {
-            let text = format!(
-                "no part has a node, object or group \"{name}\"; `taut check` lists those of a file"
-            );
-            Problem::of_file("--only", text)
-        }));
-    }
-    FileError::unless_empty(problems)?;
+    let mut parts = read_parts(request)?;
     let mut notes = Vec::new();
     note_up(request, &mut notes);
     move_to_origin(&mut parts, &mut notes);
@@ -158,6 +127,43 @@ pub fn import_unless(
     folder.write("import.txt", format!("{report}\n").as_bytes())?;
     folder.finish()?;
     Ok(report)
+}
+
+/// All parts, or all faults of all parts.
+fn read_parts(request: &ImportRequest) -> Result<Vec<(PartReport, RawMesh)>, FileError> {
+    let mut problems = Vec::new();
+    let mut names = RESERVED_NAMES.map(str::to_owned).to_vec();
+    let mut parts = Vec::new();
+    let mut names_found = vec![false; request.only.len()];
+    for (index, path) in request.parts.iter().enumerate() {
+        let own = new_name(path, &mut names);
+        let held = index == 0 && !request.obstacles_only;
+        let body = if held { GOD_OBJECT_NAME } else { &own };
+        match part(path, body, &format!("{own}.ply"), request) {
+            Ok(Part {
+                report,
+                mesh,
+                pieces,
+            }) => {
+                for (found, name) in names_found.iter_mut().zip(&request.only) {
+                    *found |= pieces.has(name);
+                }
+                parts.push((report, mesh));
+            }
+            Err(error) => problems.extend(error.into_problems()),
+        }
+    }
+    if problems.is_empty() {
+        let missing = names_found.iter().zip(&request.only);
+        problems.extend(missing.filter(|(found, _)| !**found).map(|(_, name)| {
+            let text = format!(
+                "no part has a node, object or group \"{name}\"; `taut check` lists those of a file"
+            );
+            Problem::of_file("--only", text)
+        }));
+    }
+    FileError::unless_empty(problems)?;
+    Ok(parts)
 }
 
 /// Writes the scene with the held body where its file puts it or, where it would touch the others, above them.

@@ -10,7 +10,7 @@ use super::report::{Finding, PartReport, Places};
 use super::{ImportRequest, unit};
 use crate::appearance::Appearance;
 use crate::check::{Meeting, MeshFigures};
-use crate::mesh_file::{MeshPart, Pieces, RawMesh, read_part};
+use crate::mesh_file::{FileLook, MeshPart, Pieces, RawMesh, read_part};
 use crate::problem::{FileError, Problem};
 use crate::progress::Progress;
 use crate::simplify::simplify;
@@ -97,11 +97,7 @@ pub(super) fn part(
         }
         None => (mesh, None),
     };
-    let meeting = Meeting::of(&mesh, &file.to_string());
-    if let Some(inverted) = meeting.filter(|meeting| meeting.inverted_m.is_some()) {
-        let thinner = thickened.map_or("", |_| "; a smaller --thicken may do, too");
-        return Err(fail(format!("{}{thinner}", inverted.text())));
-    }
+    let meeting = felt_meeting(&mesh, path, thickened.is_some()).map_err(fail)?;
     let raw = upright(raw_of(&mesh), request.up);
     findings.splice(0..0, told_of_file(&pieces, &request.only));
     let mut report = PartReport {
@@ -120,23 +116,27 @@ pub(super) fn part(
     if let Some(outcome) = &simplified {
         report.simplified(outcome);
     }
-    if let Some(meeting) = meeting {
-        report.findings.push(Finding::new(
-            "meets-itself",
-            &Places::of(1, Some(meeting.place_m.into())),
-            "NOT MENDED: the surface touches or runs through itself; its mass counts what overlaps twice, and the force inside is not defined",
-        ));
-    }
-    if let Some(lost) = look.not_drawn(&Appearance::default(), &RawMesh::default()) {
-        let text = format!("of its look is not drawn: {lost}");
-        let finding = Finding::new("look-lost", &Places::default(), text);
-        report.findings.push(finding);
-    }
+    report.findings.extend(told_at_last(meeting, &look));
     Ok(Part {
         report,
         mesh: raw,
         pieces,
     })
+}
+
+/// Where the surface meets itself, if what overlaps is outward; else why it is refused.
+fn felt_meeting(mesh: &Mesh, path: &Path, is_thickened: bool) -> Result<Option<Meeting>, String> {
+    match Meeting::of(mesh, &path.display().to_string()) {
+        Some(meeting) if meeting.inverted_m.is_some() => {
+            let thinner = if is_thickened {
+                "; a smaller --thicken may do, too"
+            } else {
+                ""
+            };
+            Err(format!("{}{thinner}", meeting.text()))
+        }
+        meeting => Ok(meeting),
+    }
 }
 
 /// A file that names no pieces is taken whole, whichever were chosen.
@@ -180,6 +180,24 @@ fn told_of_file(pieces: &Pieces, only: &[String]) -> Vec<Finding> {
     }
     for left_out in pieces.left_out() {
         add("left-out", 1, left_out.clone());
+    }
+    told
+}
+
+/// What is not mended, and what is not drawn.
+fn told_at_last(meeting: Option<Meeting>, look: &FileLook) -> Vec<Finding> {
+    let mut told = Vec::new();
+    if let Some(meeting) = meeting {
+        told.push(Finding::new(
+            "meets-itself",
+            &Places::of(1, Some(meeting.place_m.into())),
+            "NOT MENDED: the surface touches or runs through itself; its mass counts what overlaps twice, and the force inside is not defined",
+        ));
+    }
+    if let Some(lost) = look.not_drawn(&Appearance::default(), &RawMesh::default()) {
+        let text = format!("of its look is not drawn: {lost}");
+        let finding = Finding::new("look-lost", &Places::default(), text);
+        told.push(finding);
     }
     told
 }

@@ -3,20 +3,18 @@
 use std::path::Path;
 
 use gltf::accessor::{DataType, Dimensions};
-use gltf::buffer::Source;
-use gltf::json::validation::Checked;
 use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
 use god_object::surface::CornerCoordinates;
 use nalgebra::{Matrix4, Point3};
-use percent_encoding::percent_decode_str;
 
+use super::gltf_container::{buffers, validated};
+use super::gltf_nodes::{Placed, posed_as_it_is};
 use super::material::{Material, Materials};
 use super::pieces::Pieces;
-use super::read::{below, finite_vertex};
+use super::read::finite_vertex;
 use super::{Fault, RawMesh};
 use crate::appearance::Appearance;
-use crate::files::{MAX_MESH_BYTES, read_bytes};
 
 /// Deepest tree of nodes. Deeper is a loop or a joke.
 const MAX_NODE_DEPTH: usize = 64;
@@ -108,76 +106,6 @@ fn parse_with(
     Ok(mesh)
 }
 
-/// A node of the tree, and where it is.
-struct Placed<'f> {
-    node: gltf::Node<'f>,
-    world_from_node: Matrix4<f64>,
-    depth: usize,
-    /// Names of the nodes that it hangs below.
-    names_above: Vec<String>,
-}
-
-impl<'f> Placed<'f> {
-    fn root(node: gltf::Node<'f>) -> Self {
-        Self {
-            world_from_node: transform(&node),
-            node,
-            depth: 0,
-            names_above: Vec::new(),
-        }
-    }
-
-    fn children(&self) -> impl Iterator<Item = Self> {
-        let mut names_above = self.names_above.clone();
-        names_above.extend(self.node.name().map(str::to_owned));
-        self.node.children().map(move |child| Self {
-            world_from_node: self.world_from_node * transform(&child),
-            node: child,
-            depth: self.depth + 1,
-            names_above: names_above.clone(),
-        })
-    }
-
-    /// Its own, else its mesh's, else its number; then its mesh's and those above.
-    fn names(&self) -> Vec<String> {
-        let mesh = self.node.mesh();
-        let of_mesh = mesh.as_ref().and_then(gltf::Mesh::name);
-        let own = self.node.name().or(of_mesh).map(str::to_owned);
-        let mut names = vec![own.unwrap_or_else(|| format!("node {}", self.node.index()))];
-        names.extend(of_mesh.map(str::to_owned));
-        names.extend(self.names_above.iter().cloned());
-        names
-    }
-}
-
-fn transform(node: &gltf::Node<'_>) -> Matrix4<f64> {
-    Matrix4::from(node.transform().matrix()).cast::<f64>()
-}
-
-/// Refuses vertices that are not where the mesh has them.
-fn posed_as_it_is(node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>) -> Result<(), Fault> {
-    let number = mesh.index();
-    if is_morphed(node, mesh) {
-        return Err(Fault::new(format!(
-            "mesh {number} has morph targets with weights, which are not applied; apply its shape keys, and export it without morph targets"
-        )));
-    }
-    if node.skin().is_some() {
-        return Err(Fault::new(format!(
-            "mesh {number} has a skin, which is not applied; apply the armature, and export it again"
-        )));
-    }
-    Ok(())
-}
-
-/// Whether the vertices are not where the mesh has them. A node's weights count before its mesh's.
-fn is_morphed(node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>) -> bool {
-    let weights = node.weights().or(mesh.weights()).unwrap_or_default();
-    let mut primitives = mesh.primitives();
-    weights.iter().any(|weight| *weight != 0.0)
-        && primitives.any(|primitive| primitive.morph_targets().next().is_some())
-}
-
 /// What a material says without pictures: a factor of a picture says nothing alone.
 fn material(of: &gltf::Material<'_>) -> Material {
     let share = |value: f32| value.is_finite().then(|| value.clamp(0.0, 1.0));
@@ -203,142 +131,6 @@ fn material(of: &gltf::Material<'_>) -> Material {
             || of.emissive_texture().is_some(),
         is_defined: true,
     }
-}
-
-/// The file as the crate validates it, around what the crate panics at: its reader of containers subtracts lengths unseen, and its
-/// validation reads the accessor of a primitive's positions before it knows that there is one.
-fn validated(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
-    let invalid = |e: gltf::Error| Fault::new(format!("is no valid glTF ({e}); export it again"));
-    let (json, blob) = if bytes.starts_with(GLB_MAGIC) {
-        chunks(bytes).ok_or_else(|| {
-            Fault::new("is no valid GLB: its chunks are cut off; copy the file again")
-        })?
-    } else {
-        (bytes, None)
-    };
-    let root = gltf::json::deserialize::from_slice::<gltf::json::Root>(json)
-        .map_err(|e| invalid(gltf::Error::Deserialize(e)))?;
-    if let Some(compression) = root
-        .extensions_used
-        .iter()
-        .chain(&root.extensions_required)
-        .find_map(|name| compression(name))
-    {
-        return Err(Fault::new(format!(
-            "has meshes that are compressed with {compression}, which is not read; export it without {compression} compression"
-        )));
-    }
-    let positions = Checked::Valid(gltf::Semantic::Positions);
-    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    let mut named = primitives.filter_map(|primitive| primitive.attributes.get(&positions));
-    if let Some(missing) = named.find(|index| index.value() >= root.accessors.len()) {
-        let text = format!(
-            "has positions in accessor {}, but {} accessors; export it again",
-            missing.value(),
-            root.accessors.len()
-        );
-        return Err(Fault::new(text));
-    }
-    Ok(gltf::Gltf {
-        document: gltf::Document::from_json(root).map_err(invalid)?,
-        blob: blob.map(<[u8]>::to_vec),
-    })
-}
-
-/// The compression that an extension is, if it is one.
-fn compression(extension: &str) -> Option<&'static str> {
-    match extension {
-        "KHR_draco_mesh_compression" => Some("Draco"),
-        "EXT_meshopt_compression" | "KHR_meshopt_compression" => Some("meshopt"),
-        _ => None,
-    }
-}
-
-/// First bytes of a GLB container.
-const GLB_MAGIC: &[u8] = b"glTF";
-
-/// The text and the buffer, if there is one, of a GLB container of version 2; further chunks are passed over. `None` if it is none.
-///
-/// Source: glTF 2.0, section 4 (GLB file format).
-fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
-    let (magic, rest) = bytes.split_at_checked(GLB_MAGIC.len())?;
-    let (version, rest) = rest.split_first_chunk::<4>()?;
-    let (length, _) = rest.split_first_chunk::<4>()?;
-    let whole = bytes.get(12..u32::from_le_bytes(*length) as usize)?;
-    let (json, rest) = chunk(whole, b"JSON")?;
-    let is_glb = magic == GLB_MAGIC && u32::from_le_bytes(*version) == 2;
-    is_glb.then_some((json, chunk(rest, b"BIN\0").map(|(buffer, _)| buffer)))
-}
-
-/// The content of the first chunk if it is of this kind, and what follows it.
-fn chunk<'a>(bytes: &'a [u8], wanted: &[u8; 4]) -> Option<(&'a [u8], &'a [u8])> {
-    let (length, rest) = bytes.split_first_chunk::<4>()?;
-    let (kind, rest) = rest.split_first_chunk::<4>()?;
-    let found = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
-    (kind == wanted).then_some(found)
-}
-
-fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, Fault> {
-    let mut all = Vec::new();
-    for buffer in file.buffers() {
-        let number = buffer.index();
-        let bytes = match buffer.source() {
-            Source::Bin => file
-                .blob
-                .clone()
-                .ok_or_else(|| Fault::new("has no binary part; export it again as .glb"))?,
-            Source::Uri(uri) => match embedded(uri) {
-                Some(data) => decode_base64(data).ok_or_else(|| {
-                    Fault::new(format!(
-                        "buffer {number} is no valid base64; export it again"
-                    ))
-                })?,
-                None => {
-                    let decoded = percent_decode_str(uri).decode_utf8().map_err(|_| {
-                        Fault::new(format!("buffer {number} is `{uri}`, which is no text when its %.. are decoded; export it as .glb"))
-                    })?;
-                    let beside = directory.zip(below(&decoded));
-                    let (directory, named) = beside.ok_or_else(|| {
-                        Fault::new(format!("buffer {number} is `{uri}`, but must lie beside the file; export it as .glb"))
-                    })?;
-                    read_bytes(&directory.join(named), MAX_MESH_BYTES).map_err(|problem| {
-                        Fault::new(format!("needs buffer {number}: {problem}"))
-                    })?
-                }
-            },
-        };
-        if bytes.len() < buffer.length() {
-            let text = format!(
-                "buffer {number} is cut off: {} of {} bytes are there",
-                bytes.len(),
-                buffer.length()
-            );
-            return Err(Fault::new(text + "; copy the file again"));
-        }
-        all.push(bytes);
-    }
-    Ok(all)
-}
-
-/// The base64 of a buffer that is within the file.
-fn embedded(uri: &str) -> Option<&str> {
-    let (_, data) = uri.strip_prefix("data:")?.split_once(";base64,")?;
-    Some(data)
-}
-
-/// Names of the files that hold the buffers; none of a file that is no glTF.
-pub(super) fn buffer_files(bytes: &[u8]) -> Vec<String> {
-    let named = |buffer: gltf::Buffer<'_>| match buffer.source() {
-        Source::Uri(uri) if embedded(uri).is_none() => {
-            let decoded = percent_decode_str(uri).decode_utf8().ok()?;
-            Some(decoded.into_owned())
-        }
-        _ => None,
-    };
-    validated(bytes).map_or_else(
-        |_| Vec::new(),
-        |file| file.buffers().filter_map(named).collect(),
-    )
 }
 
 /// Positions are three floats for a vertex, indices unsigned integers, and both lie within their buffers.
@@ -517,29 +309,6 @@ fn check_accessor(accessor: &gltf::Accessor<'_>, buffers: &[Vec<u8>]) -> Result<
         && view_end.is_some_and(|end| end <= length);
     let past = || format!("accessor {number} reaches past its buffer; export the file again");
     fits.then_some(()).ok_or_else(past)
-}
-
-/// RFC 4648, with or without padding; `None` for any other character.
-fn decode_base64(text: &str) -> Option<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
-    let (mut bits, mut held) = (0u32, 0u32);
-    for character in text.trim_end_matches('=').bytes() {
-        let value = match character {
-            b'A'..=b'Z' => character - b'A',
-            b'a'..=b'z' => character - b'a' + 26,
-            b'0'..=b'9' => character - b'0' + 52,
-            b'+' => 62,
-            b'/' => 63,
-            _ => return None,
-        };
-        held = (held << 6 | u32::from(value)) & 0xFFFF;
-        bits += 6;
-        if bits >= 8 {
-            bits -= 8;
-            bytes.push((held >> bits) as u8);
-        }
-    }
-    Some(bytes)
 }
 
 #[cfg(test)]

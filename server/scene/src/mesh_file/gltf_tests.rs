@@ -145,7 +145,8 @@ fn a_buffer_beside_the_file_may_have_a_name_that_is_encoded() {
     let text = triangle("", 2);
     let (head, tail) = text.split_once("data:").unwrap();
     let (data, tail) = tail.split_once('"').unwrap();
-    let bytes = decode_base64(data.split_once(',').unwrap().1).unwrap();
+    let bytes =
+        crate::mesh_file::gltf_container::decode_base64(data.split_once(',').unwrap().1).unwrap();
     let directory = tempfile::tempdir().unwrap();
     std::fs::write(directory.path().join("a b.bin"), bytes).unwrap();
     let read = |uri: &str| {

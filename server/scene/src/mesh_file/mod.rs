@@ -1,6 +1,8 @@
 //! Triangle meshes in files: PLY, OBJ, STL, glTF.
 
 mod gltf;
+mod gltf_container;
+mod gltf_nodes;
 mod material;
 mod mtl;
 mod obj;

@@ -79,17 +79,21 @@ pub(super) fn parse(
             _ => {}
         }
     }
-    let (largest, line) = first_line_of_largest;
-    if line > 0 && largest as usize >= mesh.vertices.len() {
-        let text = format!(
-            "a face names vertex {}, but the file has {}; repair the mesh",
-            largest + 1,
-            mesh.vertices.len()
-        );
-        return Err(Fault::at(line, text));
-    }
+    vertices_are_there(first_line_of_largest, mesh.vertices.len())?;
     polygons.triangulate(&mut mesh)?;
     Ok(mesh)
+}
+
+/// Refuses a largest index that names no vertex, with its line; line 0 is of a file without faces.
+fn vertices_are_there((largest, line): (u32, usize), count: usize) -> Result<(), Fault> {
+    if line == 0 || (largest as usize) < count {
+        return Ok(());
+    }
+    let text = format!(
+        "a face names vertex {}, but the file has {count}; repair the mesh",
+        largest + 1
+    );
+    Err(Fault::at(line, text))
 }
 
 /// The libraries of materials that the file names.

@@ -4,7 +4,7 @@ use std::path::{Component, Path, PathBuf};
 
 use super::material::{FileLook, Materials};
 use super::pieces::Pieces;
-use super::{RawMesh, gltf, obj, ply, stl};
+use super::{RawMesh, gltf, gltf_container, obj, ply, stl};
 use crate::files::{MAX_MESH_BYTES, read_bytes};
 use crate::problem::{FileError, Problem};
 
@@ -110,7 +110,7 @@ pub(crate) fn read_part(path: &Path, only: &[String]) -> Result<MeshPart, FileEr
 pub(crate) fn files_beside(path: &Path) -> Vec<PathBuf> {
     let named: fn(&[u8]) -> Vec<String> = match extension(path).as_str() {
         "obj" => obj::libraries,
-        "glb" | "gltf" => gltf::buffer_files,
+        "glb" | "gltf" => gltf_container::buffer_files,
         _ => return Vec::new(),
     };
     let names = mesh_bytes(path).map_or_else(|_| Vec::new(), |bytes| named(&bytes));

@@ -9,7 +9,7 @@ use crate::environment_file::read_environment;
 use crate::height_map_file::read_height_map;
 use crate::mesh_file::read_part;
 use crate::problem::{FileError, Problem};
-use crate::trace::DeviceTrace;
+use crate::trace::{DeviceTrace, looping_fault};
 
 /// Most files of a faulty document that are read.
 const MAX_FILES: usize = 100;
@@ -23,6 +23,8 @@ enum Kind {
     Seen,
     HeightMap,
     Trace,
+    /// A trace that begins again at its end.
+    LoopingHand,
     Light,
 }
 
@@ -54,7 +56,10 @@ fn named_files(root: &Node) -> Vec<(Kind, &Node)> {
     let mut add = |kind, node: Option<_>| found.extend(node.map(|node| (kind, node)));
     let bodies = root.child("god_object").into_iter().chain(list("obstacle"));
     for body in bodies {
-        add(Kind::Mesh, within(body, &["shape", "mesh"]));
+        // What is wrong elsewhere in the file is no fault of pieces that are chosen.
+        let is_whole = within(body, &["shape", "only"]).is_none();
+        let kind = if is_whole { Kind::Mesh } else { Kind::Seen };
+        add(kind, within(body, &["shape", "mesh"]));
         let map = ["surface", "texture", "height_map", "file"];
         add(Kind::HeightMap, within(body, &map));
         add(Kind::Trace, within(body, &["motion", "trace"]));
@@ -63,7 +68,12 @@ fn named_files(root: &Node) -> Vec<(Kind, &Node)> {
         add(Kind::Seen, within(seen, &["shape", "mesh"]));
     }
     add(Kind::Light, within(root, &["view", "environment"]));
-    add(Kind::Trace, within(root, &["hand", "path"]));
+    let repeat = within(root, &["hand", "loop"]).map(|node| &node.value);
+    let hand = match repeat {
+        Some(Value::Boolean(true)) => Kind::LoopingHand,
+        _ => Kind::Trace,
+    };
+    add(hand, within(root, &["hand", "path"]));
     found
 }
 
@@ -87,5 +97,9 @@ fn faults_of(kind: Kind, path: &Path, name: &str, node: &Node) -> Vec<Problem> {
         Kind::HeightMap => Vec::from_iter(read_height_map(path).err()),
         Kind::Light => Vec::from_iter(read_environment(path).err()),
         Kind::Trace => DeviceTrace::load(path).err().map_or_else(Vec::new, told),
+        Kind::LoopingHand => match DeviceTrace::load(path) {
+            Ok(_) => Vec::from_iter(looping_fault(path)),
+            Err(error) => told(error),
+        },
     }
 }

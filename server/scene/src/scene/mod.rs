@@ -8,6 +8,7 @@ mod file_faults;
 mod load;
 mod parse;
 mod parse_look;
+mod parse_mesh_file;
 mod parse_shape;
 mod settings_tables;
 mod shipped;
@@ -19,7 +20,8 @@ pub(crate) use edit::RESERVED_NAMES;
 pub(crate) use file_faults::file_faults;
 pub(crate) use load::unusable;
 pub use load::{Scene, SceneSource};
-pub(crate) use parse_shape::{LENGTH_UNITS, pose_of};
+pub(crate) use parse_mesh_file::LENGTH_UNITS;
+pub(crate) use parse_shape::pose_of;
 pub use settings_tables::{CouplingSpec, LimitSpec, MethodSpec};
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{

@@ -3,6 +3,7 @@
 use god_object::{ForceShading, Pose, SineTexture, Surface, Texture};
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
+use super::parse_mesh_file::mesh_file;
 use super::spec::{HeightMapMapping, HeightMapSpec, Shape, VisualSpec};
 use crate::document::{Range, Section, Value};
 use crate::shapes::{Axis, PLATE, hole_circumradius};
@@ -20,16 +21,6 @@ const HOLE_FACETS: usize = 66;
 const HALF_TURN: f64 = std::f64::consts::PI;
 
 const AXES: [(&str, Axis); 3] = [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)];
-
-/// Units that a mesh file may be in, and what they are in metres.
-pub(crate) const LENGTH_UNITS: [(&str, f64); 6] = [
-    ("m", 1.0),
-    ("dm", 0.1),
-    ("cm", 0.01),
-    ("mm", 1e-3),
-    ("um", 1e-6),
-    ("inch", 0.0254),
-];
 
 /// Reads one primitive's table.
 type ReadPrimitive = fn(&Section<'_>) -> Option<Shape>;
@@ -64,17 +55,7 @@ fn shape_of(body: &Section<'_>, key: &'static str) -> Option<Shape> {
         return None;
     };
     let mut found = Vec::new();
-    if let Some(path) = shape.text("mesh") {
-        let unit = shape.choice("unit", &LENGTH_UNITS).unwrap_or(1.0);
-        let scale = unit * shape.number_or("scale", Range::Positive, 1.0);
-        found.push(Some(Shape::Mesh {
-            path: path.to_owned(),
-            scale,
-            is_scaled: shape.has("unit") || shape.has("scale"),
-            only: only(&shape),
-            simplify: simplify(&shape),
-        }));
-    }
+    found.extend(mesh_file(&shape).map(Some));
     let primitives: [(&'static str, ReadPrimitive); 6] = [
         ("sphere", sphere),
         ("box", cuboid),
@@ -107,30 +88,6 @@ fn shape_of(body: &Section<'_>, key: &'static str) -> Option<Shape> {
     } else {
         None
     }
-}
-
-/// `only = ["name"]`: which pieces of the file.
-fn only(shape: &Section<'_>) -> Vec<String> {
-    let Some(names) = shape.texts("only") else {
-        return Vec::new();
-    };
-    if names.is_empty() {
-        let at = shape.get("only").map_or(shape.at(), |node| &node.at);
-        let text = format!(
-            "`only` in {} names no piece; write names of nodes, objects or groups, as only = [\"peg\"], or leave it out",
-            shape.name()
-        );
-        shape.complain(at, text);
-    }
-    names.into_iter().map(|(name, _)| name.to_owned()).collect()
-}
-
-/// `simplify = { max_error }`: the most distance, m.
-fn simplify(shape: &Section<'_>) -> Option<f64> {
-    let section = shape.section("simplify")?;
-    let max_error = section.required_number("max_error", Range::Positive, "max_error = 1e-4");
-    section.finish();
-    max_error
 }
 
 fn axis(section: &Section<'_>, default: Axis) -> Axis {

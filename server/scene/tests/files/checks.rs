@@ -52,7 +52,7 @@ fn lengths_far_below_a_micrometre_have_digits() {
     let scene = "name = \"a\"\n[god_object]\nshape = { sphere = { radius = 0.01 } }\nmass = 1\n[method]\nclearance = 1e-9\n";
     let report = Folder::new().check("scene.toml", scene.as_bytes());
     assert!(
-        report.summary.contains("rest distance 1.0e-4 um"),
+        report.summary.contains("rest distance 0.100 nm"),
         "{report}"
     );
 }
@@ -134,13 +134,13 @@ fn a_part_in_millimetres_is_doubted_in_its_scene_and_taken_with_its_unit() {
     let metres = folder.check("metres.toml", scene(""));
     assert_eq!(metres.notes.len(), 1, "{metres}");
     assert!(
-        metres.notes[0].contains("6.000e1 m") && metres.notes[0].contains("unit = \"mm\""),
+        metres.notes[0].contains("60.00 m") && metres.notes[0].contains("unit = \"mm\""),
         "{metres}"
     );
     for (more, longest) in [
-        (", unit = \"mm\"", "god-object 0.0600 m"),
-        (", unit = \"mm\", scale = 2.0", "god-object 0.1200 m"),
-        (", scale = 0.001", "god-object 0.0600 m"),
+        (", unit = \"mm\"", "god-object 60.00 mm"),
+        (", unit = \"mm\", scale = 2.0", "god-object 120.0 mm"),
+        (", scale = 0.001", "god-object 60.00 mm"),
     ] {
         let report = folder.check("part.toml", scene(more));
         assert!(
@@ -201,7 +201,10 @@ fn a_scenes_faults_come_with_lines_and_as_json_values() {
         .unwrap()
         .replace("mass = 1.0", "mas = 1.0")
         .replace("k_h", "kh");
-    let report = Folder::new().check("scene.toml", text);
+    let folder = Folder::new();
+    let hand = include_str!("../../../scenes/sphere-on-plane.csv");
+    folder.file("sphere-on-plane.csv", hand);
+    let report = folder.check("scene.toml", text);
     assert_eq!(report.problems.len(), 3, "{report}");
     assert!(report.problems.iter().all(|p| p.line.is_some()));
     assert!(report.to_string().contains("3 faults"), "{report}");

@@ -145,7 +145,7 @@ fn what_cannot_be_taken_is_refused_by_name_and_changes_nothing() {
         ("plate.pose.position=[0,0,inf]", &["inf", "finite"]),
         ("plate.far.pose.position=[0,0]", &["has 2 numbers"]),
         ("plate.pose.rotation=[2,0,0,0]", &["rotation"]),
-        ("plate.color=red", &["color"]),
+        ("plate.color=redd", &["color"]),
         (
             "plate.shape.box.half_extents=[1,1,1]",
             &["no key that can be changed", "pose.position"],

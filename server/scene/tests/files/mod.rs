@@ -1,5 +1,6 @@
 //! Scenes, workbenches, shapes and checks from outside the crate.
 
+mod check_scenes;
 mod checks;
 mod edits;
 mod exact_shapes;
@@ -10,6 +11,7 @@ mod scene_faults;
 mod scene_page;
 mod shipped;
 mod simplification;
+mod surfaces;
 mod workbench_faults;
 mod workbench_inputs;
 mod workbench_lookers_on;

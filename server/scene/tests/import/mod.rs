@@ -5,6 +5,7 @@ mod cases;
 mod folder;
 mod judge;
 mod page;
+mod pieces;
 mod rubble;
 mod solids;
 mod write;
