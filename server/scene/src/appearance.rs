@@ -38,7 +38,7 @@ pub(crate) fn linear(value: f64) -> f64 {
 }
 
 /// The sRGB value of linear light, both 0 to 1: the inverse of [`linear`].
-fn encoded(light: f64) -> f64 {
+pub(crate) fn encoded(light: f64) -> f64 {
     if light <= 0.003_130_8 {
         12.92 * light
     } else {

@@ -14,6 +14,7 @@ mod placing;
 mod repair;
 mod report;
 mod scene_text;
+mod seen;
 mod shell;
 mod stitch;
 mod unit;
@@ -37,6 +38,7 @@ use hand_path::hand_path;
 use part::{Part, new_name, part};
 use placing::{move_to_origin, note_up};
 use scene_text::{HAND_SECTION, Placed, around, clear_above, scene_text, sphere_radius};
+use seen::Seen;
 
 /// Name of the scene file in the folder.
 const SCENE_FILE: &str = "scene.toml";
@@ -80,13 +82,18 @@ pub fn import_unless(
 ) -> Result<ImportReport, FileError> {
     // What cannot be made is refused before the work; nothing is there while it lasts.
     drop(NewFolder::create(&request.folder)?);
-    let mut parts = read_parts(request)?;
+    let (mut parts, mut seen) = read_parts(request)?;
     let mut notes = Vec::new();
     note_up(request, &mut notes);
-    move_to_origin(&mut parts, &mut notes);
+    if let Some(way) = move_to_origin(&mut parts, &mut notes) {
+        seen.iter_mut()
+            .flatten()
+            .for_each(|seen| seen.move_by(&way));
+    }
     let placed: Vec<Placed> = parts
         .iter()
-        .map(|(report, mesh)| {
+        .zip(&seen)
+        .map(|((report, mesh), seen)| {
             let (low, high) = mesh
                 .bounds()
                 .unwrap_or((Point3::origin(), Point3::origin()));
@@ -94,6 +101,7 @@ pub fn import_unless(
                 body: report.body.clone(),
                 mesh_file: report.mesh_file.clone(),
                 appearance: report.appearance,
+                seen_file: seen.as_ref().map(Seen::file),
                 low,
                 high,
             }
@@ -109,9 +117,12 @@ pub fn import_unless(
     go_on()?;
     let folder = NewFolder::create(&request.folder)?;
     let mut reports = Vec::with_capacity(parts.len());
-    for (report, mesh) in parts {
+    for ((report, mesh), seen) in parts.into_iter().zip(seen) {
         go_on()?;
         folder.write(&report.mesh_file, &write_ply(&mesh))?;
+        for (name, text) in seen.iter().flat_map(Seen::files) {
+            folder.write(&name, text.as_bytes())?;
+        }
         reports.push(report);
     }
     go_on()?;
@@ -129,11 +140,14 @@ pub fn import_unless(
     Ok(report)
 }
 
+/// Reports and surfaces of all parts, and what is drawn instead of some.
+type ReadParts = (Vec<(PartReport, RawMesh)>, Vec<Option<Seen>>);
+
 /// All parts, or all faults of all parts.
-fn read_parts(request: &ImportRequest) -> Result<Vec<(PartReport, RawMesh)>, FileError> {
+fn read_parts(request: &ImportRequest) -> Result<ReadParts, FileError> {
     let mut problems = Vec::new();
     let mut names = RESERVED_NAMES.map(str::to_owned).to_vec();
-    let mut parts = Vec::new();
+    let (mut parts, mut all_seen) = (Vec::new(), Vec::new());
     let mut names_found = vec![false; request.only.len()];
     for (index, path) in request.parts.iter().enumerate() {
         let own = new_name(path, &mut names);
@@ -143,12 +157,14 @@ fn read_parts(request: &ImportRequest) -> Result<Vec<(PartReport, RawMesh)>, Fil
             Ok(Part {
                 report,
                 mesh,
+                seen,
                 pieces,
             }) => {
                 for (found, name) in names_found.iter_mut().zip(&request.only) {
                     *found |= pieces.has(name);
                 }
                 parts.push((report, mesh));
+                all_seen.push(seen);
             }
             Err(error) => problems.extend(error.into_problems()),
         }
@@ -163,7 +179,7 @@ fn read_parts(request: &ImportRequest) -> Result<Vec<(PartReport, RawMesh)>, Fil
         }));
     }
     FileError::unless_empty(problems)?;
-    Ok(parts)
+    Ok((parts, all_seen))
 }
 
 /// Writes the scene with the held body where its file puts it or, where it would touch the others, above them.

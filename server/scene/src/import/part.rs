@@ -7,10 +7,11 @@ use god_object::Mesh;
 use super::placing::upright;
 use super::repair::{Repaired, Wishes, is_single, repair};
 use super::report::{Finding, PartReport, Places};
+use super::seen::Seen;
 use super::{ImportRequest, unit};
 use crate::appearance::Appearance;
 use crate::check::{Meeting, MeshFigures};
-use crate::mesh_file::{FileLook, MeshPart, Pieces, RawMesh, read_part};
+use crate::mesh_file::{MeshPart, Pieces, RawMesh, read_part};
 use crate::problem::{FileError, Problem};
 use crate::progress::Progress;
 use crate::simplify::simplify;
@@ -22,6 +23,8 @@ const MAX_NAME_BYTES: usize = 128;
 pub(super) struct Part {
     pub(super) report: PartReport,
     pub(super) mesh: RawMesh,
+    /// What is drawn instead, where its triangles do not all look alike.
+    pub(super) seen: Option<Seen>,
     /// Of its file.
     pub(super) pieces: Pieces,
 }
@@ -69,6 +72,8 @@ pub(super) fn part(
     request: &ImportRequest,
 ) -> Result<Part, FileError> {
     let MeshPart { mesh, look, pieces } = read(path, &request.only)?;
+    let lost = look.not_drawn(&Appearance::default(), &mesh);
+    let as_read = (!look.parts.is_empty()).then(|| mesh.clone());
     // A vertex of no triangle is no part of the surface, however far away it is.
     let raw = mesh.without_unused();
     let fail = |text: String| FileError::from(Problem::of_file(path.display(), text));
@@ -90,6 +95,11 @@ pub(super) fn part(
         FileError::of_all(faults.into_iter().map(of_file).collect())
     })?;
     drop(progress);
+    let seen = as_read.and_then(|mesh| {
+        Seen::of(mesh, &look, mesh_file, |mesh| {
+            upright(mesh.scaled(unit.metres), request.up)
+        })
+    });
     let (mesh, simplified) = match request.simplify {
         Some(max_error) => {
             let (mesh, outcome) = simplify(mesh, max_error, body);
@@ -116,10 +126,11 @@ pub(super) fn part(
     if let Some(outcome) = &simplified {
         report.simplified(outcome);
     }
-    report.findings.extend(told_at_last(meeting, &look));
+    report.findings.extend(told_at_last(meeting, lost));
     Ok(Part {
         report,
         mesh: raw,
+        seen,
         pieces,
     })
 }
@@ -185,7 +196,7 @@ fn told_of_file(pieces: &Pieces, only: &[String]) -> Vec<Finding> {
 }
 
 /// What is not mended, and what is not drawn.
-fn told_at_last(meeting: Option<Meeting>, look: &FileLook) -> Vec<Finding> {
+fn told_at_last(meeting: Option<Meeting>, lost: Option<String>) -> Vec<Finding> {
     let mut told = Vec::new();
     if let Some(meeting) = meeting {
         told.push(Finding::new(
@@ -194,7 +205,7 @@ fn told_at_last(meeting: Option<Meeting>, look: &FileLook) -> Vec<Finding> {
             "NOT MENDED: the surface touches or runs through itself; its mass counts what overlaps twice, and the force inside is not defined",
         ));
     }
-    if let Some(lost) = look.not_drawn(&Appearance::default(), &RawMesh::default()) {
+    if let Some(lost) = lost {
         let text = format!("of its look is not drawn: {lost}");
         let finding = Finding::new("look-lost", &Places::default(), text);
         told.push(finding);

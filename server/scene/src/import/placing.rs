@@ -58,15 +58,16 @@ pub(super) fn note_up(request: &ImportRequest, notes: &mut Vec<String>) {
     notes.push(text.to_owned());
 }
 
-/// Parts keep their places to each other; only when all are far away, all are moved by the same way.
-pub(super) fn move_to_origin(parts: &mut [(PartReport, RawMesh)], notes: &mut Vec<String>) {
+/// Parts keep their places to each other; only when all are far away, all are moved by the same way, which is given.
+pub(super) fn move_to_origin(
+    parts: &mut [(PartReport, RawMesh)],
+    notes: &mut Vec<String>,
+) -> Option<Vector3<f64>> {
     let boxes = parts.iter().filter_map(|(_, mesh)| mesh.bounds());
-    let Some((low, high)) = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1))) else {
-        return;
-    };
+    let (low, high) = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))?;
     let way: Vector3<f64> = -nalgebra::center(&low, &high).coords;
     if way.norm() <= FAR_AWAY * (high - low).norm() {
-        return;
+        return None;
     }
     for vertex in parts.iter_mut().flat_map(|(_, mesh)| &mut mesh.vertices) {
         *vertex += way;
@@ -75,4 +76,5 @@ pub(super) fn move_to_origin(parts: &mut [(PartReport, RawMesh)], notes: &mut Ve
         "the parts lie far from the origin of their files; all were moved by the same {}, and places above are those before",
         place_text(&Point3::from(way))
     ));
+    Some(way)
 }

@@ -29,6 +29,8 @@ pub(super) struct Placed {
     pub(super) body: String,
     pub(super) mesh_file: String,
     pub(super) appearance: Appearance,
+    /// Of a surface that is drawn instead, with its own looks.
+    pub(super) seen_file: Option<String>,
     pub(super) low: Point3<f64>,
     pub(super) high: Point3<f64>,
 }
@@ -85,7 +87,7 @@ pub(super) fn scene_text(
         "pose = {{ position = [{x:?}, {y:?}, {z:?}], rotation = [1.0, 0.0, 0.0, 0.0] }}    # m; w x y z"
     );
     if let Some(part) = held {
-        write_look(&mut text, &part.appearance);
+        write_look(&mut text, part);
     }
     for part in obstacles {
         let _ = writeln!(
@@ -94,7 +96,7 @@ pub(super) fn scene_text(
             quoted(&part.body),
             quoted(&part.mesh_file)
         );
-        write_look(&mut text, &part.appearance);
+        write_look(&mut text, part);
     }
     let longest = around(obstacles).map_or(longest, |(low, high)| longest.max((high - low).max()));
     let scale = two_digits(DRAWN_WIDTH / longest);
@@ -121,8 +123,20 @@ pub(super) fn scene_text(
 }
 
 /// A line for each key that the part's file says.
-fn write_look(text: &mut String, appearance: &Appearance) {
+fn write_look(text: &mut String, part: &Placed) {
+    let mut appearance = part.appearance;
     // Writing to a String cannot fail.
+    if let Some(file) = &part.seen_file {
+        let _ = writeln!(
+            text,
+            "visual = {{ mesh = {} }}    # drawn instead, with the looks of its materials; color = \"...\" gives all of it one",
+            quoted(file)
+        );
+        appearance = Appearance {
+            opacity: appearance.opacity,
+            ..Appearance::default()
+        };
+    }
     if let Some(colour) = appearance.color {
         let _ = writeln!(text, "color = \"{}\"", text_of_colour(colour));
     }

@@ -181,6 +181,45 @@ fn triangles_look_as_their_own_materials_say() {
 }
 
 #[test]
+fn an_imported_part_is_seen_with_the_looks_of_its_file() {
+    let folder = Folder::new();
+    folder.gltf("a.gltf", &format!("{STEEL},{RED}"), "");
+    let made = folder.0.path().join("made");
+    let report = import(&ImportRequest {
+        parts: vec![folder.0.path().join("a.gltf")],
+        folder: made.clone(),
+        ..ImportRequest::default()
+    });
+    let report = report.unwrap();
+    assert!(!report.to_string().contains("of its materials"), "{report}");
+    let built = Scene::load(&made.join("scene.toml"))
+        .and_then(|scene| scene.build())
+        .unwrap();
+    let direct = folder.built("shape = { mesh = \"a.gltf\" }", "");
+    let [seen, asked] = [&built.bodies[0], &direct.bodies[0]];
+    assert_eq!(seen.mesh.triangles.len(), 12);
+    let counts = |body: &taut_scene::BuiltBody| -> Vec<usize> {
+        body.looks.iter().map(|(_, count)| *count).collect()
+    };
+    assert_eq!(counts(seen), counts(asked));
+    for ((seen, _), (asked, _)) in seen.looks.iter().zip(&asked.looks) {
+        let [a, b] = [seen, asked].map(|look| look.color.unwrap());
+        assert!(
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4),
+            "{a:?} {b:?}"
+        );
+        assert_eq!(
+            (seen.roughness, seen.metallic),
+            (asked.roughness, asked.metallic)
+        );
+    }
+    let corners = [&seen.mesh, &asked.mesh].map(|mesh| mesh.bounds().unwrap());
+    assert!(
+        (corners[0].0 - corners[1].0).norm() < 1e-9 && (corners[0].1 - corners[1].1).norm() < 1e-9
+    );
+}
+
+#[test]
 fn what_is_drawn_may_be_another_form_than_what_is_felt() {
     let folder = Folder::new();
     folder.gltf("a.gltf", &format!("{STEEL},{RED}"), "");
