@@ -54,10 +54,20 @@ fn vertex(
     return fragment;
 }
 
+// Marks have light of their own, and a dark rim, so that they are seen before any colour: the outer tenth of a dot's radius, of an arrow's
+// shaft on either side; soft over as much again.
+fn within_rim(in: Fragment) -> f32 {
+    let facing = dot(normalize(in.normal), normalize(frame.eye.xyz - in.position));
+    return mix(0.04, 1.0, smoothstep(0.44, 0.6, facing)); // the cosines at 0.9 and 0.8 of the radius
+}
+
 // The colour of a fragment; in w how much of what is behind a translucent body its shine covers.
 fn seen(in: Fragment) -> vec4<f32> {
     let light = surface_light(in.position, normalize(in.normal), in.colour.rgb, in.finish);
-    let colour = shown(mix(light.matt + light.shine, in.colour.rgb, in.finish.y));
+    var colour = shown(mix(light.matt + light.shine, in.colour.rgb, in.finish.y));
+    if in.finish.y > 0.0 {
+        colour *= within_rim(in);
+    }
     return vec4(colour, clamp(max(light.shine.r, max(light.shine.g, light.shine.b)), 0.0, 1.0));
 }
 
