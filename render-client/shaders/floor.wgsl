@@ -48,7 +48,7 @@ fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     }
     let normal = vec3(0.0, 0.0, 1.0);
     let colour = mix(vec3(0.045, 0.051, 0.062), vec3(0.22, 0.25, 0.29), 0.45 * line);
-    let light = colour * falling_light(in.position, normal).rgb;
+    let light = colour * falling_light(in.position, normal).light;
     let behind = surroundings(normalize(in.position - frame.eye.xyz), in.clip.xy);
     return vec4(mix(behind, shown(light), share), 1.0);
 }

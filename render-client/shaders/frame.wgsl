@@ -1,5 +1,6 @@
 // What every shader knows of the eye, the lights and the shadow map. Put before the others.
-// Frame: workbench, metres, z up. Colours: linear. Before this stands SMOOTH: whether edges are worth their cost (pipeline.rs).
+// Frame: workbench, metres, z up. Colours: linear. Before this stand SMOOTH, whether edges are worth their cost (pipeline.rs), and
+// covering.wgsl.
 
 struct Frame {
     clip_from_workbench: mat4x4<f32>,
@@ -9,6 +10,7 @@ struct Frame {
     key: vec4<f32>,          // unit, to the light; w: size of a shadow texel, m
     floor: vec4<f32>,        // centre; w: radius, m
     grid: vec4<f32>,         // x: spacing of the lines, m; y, z: nearer is not drawn, farther is drawn whole, m; w: 1 with reflections
+    shade: vec4<f32>,        // x: discs of occlusion.wgsl from depth 0 to 1; y, z: level under the bodies and radius around them, m
     irradiance: array<vec4<f32>, 9>, // over pi: factors of 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy of the normal
 }
 
@@ -18,18 +20,32 @@ struct Frame {
 
 @group(0) @binding(3) var environment: texture_cube<f32>;
 @group(0) @binding(4) var environment_sampler: sampler;
+@group(0) @binding(5) var occlusion: texture_2d<f32>;
 
 const PI = 3.14159265;
 const KEY_COLOUR = vec3<f32>(1.0, 0.955, 0.88) * 1.10; // over pi; a light colour facing it stays below the bend of the tone curve
 const MOST_SHINE = 1.1;          // of the lamp: beyond it there is nothing but white
 const ROUGHEST_LEVEL = 4.0;      // of the environment
 const NARROWEST = 0.07;          // alpha of the sharpest highlight: a narrower one, of a lamp without size, falls between the pixels
+const OFF_SURFACE = 0.1;         // of the disc: more than the mean of its samples is off, so that a flat surface does not cover itself
+const COVERED = 0.35;            // share of the surroundings that is hidden where the lamp sees nothing of what is around a point. Half of
+                                 // them made shadows on the floor black
 const DIELECTRIC = vec3<f32>(0.04); // share of light that plastic and glass mirror head-on
 
+// A point in the shadow map, and the step of a texel's size along the normal there.
+struct InMap {
+    clip: vec3<f32>,
+    step: vec3<f32>,
+}
+
+fn in_map(position: vec3<f32>, normal: vec3<f32>) -> InMap {
+    let step = frame.shadow_from_workbench * vec4(normal * frame.key.w, 0.0);
+    return InMap((frame.shadow_from_workbench * vec4(position, 1.0)).xyz, step.xyz);
+}
+
 // Share of the key light that reaches a point: 2 x 2 samples, each filtered over 2 x 2 texels; one where edges are not smooth.
-fn lit_by_key(position: vec3<f32>, normal: vec3<f32>) -> f32 {
-    let off_surface = position + normal * (1.6 * frame.key.w);
-    let clip = frame.shadow_from_workbench * vec4(off_surface, 1.0);
+fn lit_by_key(in_map: InMap) -> f32 {
+    let clip = in_map.clip + in_map.step * 1.6;
     let place = clip.xy * vec2(0.5, -0.5) + 0.5;
     if any(place < vec2(0.0)) || any(place > vec2(1.0)) || clip.z > 1.0 {
         return 1.0; // outside the map nothing casts
@@ -46,9 +62,29 @@ fn lit_by_key(position: vec3<f32>, normal: vec3<f32>) -> f32 {
     return 0.25 * lit;
 }
 
-// Share of the surroundings that is seen in a direction: near the floor it hides half of them.
+// Share of the surroundings that bodies around a point let through: as much of the disc around it (occlusion.wgsl) as lies no nearer to the
+// lamp than it does, by Chebyshev's inequality. It takes the lamp, which is above, for all that is around. Where a surface turns away from the
+// lamp the map shows the body's own other side and nothing of what is before the surface: all is let through there.
+fn uncovered(in_map: InMap, to_key: f32) -> f32 {
+    let known = smoothstep(0.0, 0.25, to_key);
+    if known == 0.0 {
+        return 1.0;
+    }
+    let clip = in_map.clip + in_map.step * (OFF_SURFACE * RADIUS);
+    let place = clip.xy * vec2(0.5, -0.5) + 0.5;
+    if any(place < vec2(0.0)) || any(place > vec2(1.0)) {
+        return 1.0;
+    }
+    let around = textureSampleLevel(occlusion, environment_sampler, place, 0.0).xy; // mean, spread
+    let deeper = max(below_middle(clip.z, frame.shade.x) - around.x, 0.0);
+    let variance = around.y * around.y + 1e-4;
+    let hidden = deeper * deeper / (variance + deeper * deeper);
+    return 1.0 - COVERED * known * hidden;
+}
+
+// Share of the surroundings that is seen in a direction: near what the bodies stand on it hides half of them.
 fn open_share(position: vec3<f32>, direction: vec3<f32>) -> f32 {
-    let height = (position.z - frame.floor.z) / (0.28 * frame.floor.w);
+    let height = (position.z - frame.shade.y) / (1.26 * frame.shade.z);
     return mix(0.55, 1.0, smoothstep(0.0, 1.0, height + 0.5 * max(direction.z, 0.0)));
 }
 
@@ -76,11 +112,18 @@ fn key_pool(position: vec3<f32>) -> f32 {
     return mix(0.25, 1.0, 1.0 - smoothstep(0.12, 0.85, away));
 }
 
-// Light that falls on a surface, over pi; its share of the key light, for the highlight, in w.
-fn falling_light(position: vec3<f32>, normal: vec3<f32>) -> vec4<f32> {
+struct Falling {
+    light: vec3<f32>,     // over pi
+    key_share: f32,       // of the key light, for the highlight
+    uncovered: f32,
+}
+
+fn falling_light(position: vec3<f32>, normal: vec3<f32>) -> Falling {
     let to_key = dot(normal, frame.key.xyz);
-    let key_share = lit_by_key(position, normal) * smoothstep(0.0, 0.12, to_key) * key_pool(position);
-    return vec4(ambient(position, normal) + KEY_COLOUR * (key_share * max(to_key, 0.0)), key_share);
+    let place = in_map(position, normal);
+    let key_share = lit_by_key(place) * smoothstep(0.0, 0.12, to_key) * key_pool(position);
+    let open = uncovered(place, to_key);
+    return Falling(open * ambient(position, normal) + KEY_COLOUR * (key_share * max(to_key, 0.0)), key_share, open);
 }
 
 // Share of even light from all around that a surface mirrors, by the cosine to the eye: a fit of the split sum's second factor.
@@ -119,10 +162,11 @@ fn surface_light(position: vec3<f32>, normal: vec3<f32>, colour: vec3<f32>, fini
     let falling = falling_light(position, normal);
     let head_on = mix(DIELECTRIC, colour, finish.z);
     let mirrored = mirrored_share(head_on, finish.x, max(dot(normal, to_eye), 0.0));
-    let around = mirrored * mirrored_light(position, reflect(-to_eye, normal), finish.x);
-    var lamp = KEY_COLOUR * falling.w * highlight(normal, to_eye, frame.key.xyz, head_on, finish.x);
+    // Squared: a metal has no matt light whose shadow could tell where a body stands on it.
+    let around = falling.uncovered * falling.uncovered * mirrored * mirrored_light(position, reflect(-to_eye, normal), finish.x);
+    var lamp = KEY_COLOUR * falling.key_share * highlight(normal, to_eye, frame.key.xyz, head_on, finish.x);
     lamp *= min(1.0, MOST_SHINE / max(max(lamp.r, lamp.g), max(lamp.b, 1e-4)));
-    return Leaving(colour * falling.rgb * (1.0 - mirrored) * (1.0 - finish.z), around + lamp);
+    return Leaving(colour * falling.light * (1.0 - mirrored) * (1.0 - finish.z), around + lamp);
 }
 
 // Keeps bright parts from clipping and their hue from turning: about linear below 0.6.

@@ -13,5 +13,6 @@ mod perceptual;
 mod pictures;
 mod preview;
 mod screens;
+mod shade;
 mod support;
 mod windows;

@@ -107,9 +107,9 @@ fn the_adapter_tells_how_long_it_took_for_each_pass() {
     let drawing = ["picture", "picture", "anaglyph"];
     let mut hand = 0.0;
     for shadows in [
-        vec!["standing shadows", "moving shadows"],
+        vec!["standing shadows", "moving shadows", "occlusion"],
         vec![],
-        vec!["moving shadows"],
+        vec!["moving shadows", "occlusion"],
     ] {
         if !shadows.is_empty() {
             hand += 1e-4;

@@ -11,9 +11,11 @@ use nalgebra::Point3;
 
 use super::anaglyph::Anaglyph;
 use super::environment::EnvironmentMap;
-use super::frame::{Floor, FrameUniform, KeyLight, Light};
+use super::frame::{Enclosure, Floor, FrameUniform, KeyLight, Light};
 use super::gpu::Gpu;
+use super::ground::{Ground, around, lowest_point, standing};
 use super::mesh::{Batch, Instance, MeshBuffers};
+use super::occlusion::OcclusionMap;
 use super::overlay::OverlayPipeline;
 use super::picture::{PictureTarget, ViewTarget};
 use super::pipeline::{FrameLayout, Output};
@@ -21,12 +23,12 @@ use super::pipelines::Pipelines;
 use super::resources::buffer;
 use super::shadow::ShadowMap;
 use super::warp::WarpPipeline;
-use super::{contacts, god_object, shapes};
+use super::{contacts, shapes};
 use crate::comfort::Comfort;
 use crate::detail::{Detail, UNSEEN_PIXELS, made_beside};
 use crate::hud::Overlay;
 use crate::normals::{Shaded, shade};
-use crate::stage::{Bounds, Stage, StageBody, TriangleMesh};
+use crate::stage::{Bounds, Stage, TriangleMesh};
 use crate::stereo::Picture;
 use crate::view::{ClipPlanes, Eye, Eyes, Magnification, Screen};
 
@@ -39,6 +41,7 @@ pub struct Renderer {
     anaglyph: Anaglyph,
     warp: WarpPipeline,
     shadow: ShadowMap,
+    occlusion: OcclusionMap,
     environment: EnvironmentMap,
     meshes: Vec<MeshBuffers>,
     /// Levels of detail that are still being made, with the places of their meshes.
@@ -47,6 +50,8 @@ pub struct Renderer {
     god_object_box: (Point3<f64>, Point3<f64>),
     instances: wgpu::Buffer,
     floor: Floor,
+    ground: Ground,
+    enclosure: Enclosure,
     clip_planes: ClipPlanes,
     comfort: Comfort,
     /// Largest error of what is drawn with fewer triangles than it has.
@@ -106,14 +111,24 @@ impl Renderer {
         let most = stage.obstacles.len() + 2 + contacts::MAX_CONTACTS + 1;
         let bytes = (most * size_of::<Instance>()) as u64;
         let instances = buffer(device, "instances", bytes, wgpu::BufferUsages::VERTEX);
-        let bodies = standing_bodies(stage, &mesh_bounds);
+        let standing = standing(stage);
+        let bodies = around(stage, &standing, &mesh_bounds);
+        let floor = Floor::under(
+            &bodies,
+            lowest_point(stage, &standing) - 0.004 * bodies.radius,
+        );
+        let ground = Ground::of(stage, &mesh_bounds);
+        let carried = ground.carried(stage);
+        let nearest = around(stage, &carried, &mesh_bounds);
+        let shadow = ShadowMap::new(device);
         Self {
             output,
             layout,
             pipelines,
             anaglyph: Anaglyph::new(device, format),
             warp: WarpPipeline::new(device, format),
-            shadow: ShadowMap::new(device),
+            occlusion: OcclusionMap::new(device, &shadow),
+            shadow,
             environment: EnvironmentMap::new(gpu, &stage.environment),
             meshes,
             levels: Mutex::new(made_beside(shaded.into_iter().enumerate().collect())),
@@ -123,7 +138,12 @@ impl Renderer {
                 (stage.god_object.place(&low), stage.god_object.place(&high))
             },
             instances,
-            floor: Floor::under(&bodies, lowest_point(stage) - 0.004 * bodies.radius),
+            floor,
+            enclosure: Enclosure {
+                level: lowest_point(stage, &carried) - 0.004 * nearest.radius,
+                radius: nearest.radius,
+            },
+            ground,
             clip_planes: stage.clip_planes,
             comfort: stage.comfort,
             unseen_pixels: UNSEEN_PIXELS,
@@ -133,7 +153,7 @@ impl Renderer {
             shadow_passes: 0,
             triangles: AtomicU64::new(0),
             plan: Plan {
-                light: KeyLight::fit(&bodies, ShadowMap::TEXELS),
+                light: KeyLight::fit(&nearest, &bodies, ShadowMap::TEXELS),
                 stale: true,
                 reflections: true,
                 casters: Vec::new(),
@@ -152,10 +172,11 @@ impl Renderer {
             layout,
             shadow,
             environment,
+            occlusion,
             anaglyph,
             ..
         } = self;
-        let maps = (shadow, environment);
+        let maps = (shadow, environment, occlusion);
         PictureTarget::new(gpu, picture, size, *output, layout, maps, anaglyph)
     }
 
@@ -278,7 +299,8 @@ impl Renderer {
             irradiance: &self.environment.irradiance,
             reflections: self.plan.reflections,
         };
-        let uniform = FrameUniform::new(&clip, &eye, &light, &self.floor, self.plan.stale, &fade);
+        let places = (&self.floor, &self.enclosure);
+        let uniform = FrameUniform::new(&clip, &eye, &light, places, self.plan.stale, &fade);
         gpu.queue
             .write_buffer(&view.uniform, 0, bytemuck::bytes_of(&uniform));
         Some(eye)
@@ -344,37 +366,6 @@ impl Renderer {
 
 fn ordered(mesh: &TriangleMesh) -> Shaded {
     shade(mesh).in_drawing_order()
-}
-
-/// The obstacles that are seen; the god-object where there are none.
-fn standing_bodies(stage: &Stage, mesh_bounds: &[Bounds]) -> Bounds {
-    let bounds = |body: &StageBody| stage.body_bounds(body, &body.pose, &mesh_bounds[body.mesh]);
-    let seen = stage.obstacles.iter().filter(|body| body.opacity > 0.0);
-    let all = seen.map(bounds).reduce(|a, b| a.union(&b));
-    all.unwrap_or_else(|| bounds(&stage.god_object))
-}
-
-/// Height of the lowest vertex of what stands on the workbench, in metres.
-fn lowest_point(stage: &Stage) -> f64 {
-    let seen = |body: &&StageBody| body.opacity > 0.0;
-    let mut standing: Vec<&StageBody> = stage.obstacles.iter().filter(seen).collect();
-    if standing.is_empty() {
-        standing.push(&stage.god_object);
-    }
-    let height = |body: &StageBody| {
-        let model = god_object::workbench_from_mesh(stage, body, &body.pose);
-        let mesh = &stage.meshes[body.mesh];
-        let heights = mesh
-            .vertices
-            .iter()
-            .map(move |v| model.transform_point(&Point3::from(*v).cast::<f64>()).z);
-        heights.fold(f64::INFINITY, f64::min)
-    };
-    let lowest = standing
-        .into_iter()
-        .map(height)
-        .fold(f64::INFINITY, f64::min);
-    if lowest.is_finite() { lowest } else { 0.0 }
 }
 
 /// Confines what follows to the pixels of a view.

@@ -2,12 +2,10 @@
 
 use super::anaglyph::Anaglyph;
 use super::chart::ChartDrawing;
-use super::environment::EnvironmentMap;
 use super::gpu::Gpu;
 use super::overlay::OverlayQuads;
-use super::pipeline::{DEPTH, FrameLayout, Output};
+use super::pipeline::{DEPTH, FrameLayout, Maps, Output};
 use super::resources::{attachment, buffer};
-use super::shadow::ShadowMap;
 use super::warp::WarpTarget;
 use crate::error::RenderError;
 use crate::stereo::{Part, Picture};
@@ -48,7 +46,7 @@ impl PictureTarget {
         size: (u32, u32),
         output: Output,
         layout: &FrameLayout,
-        (shadow, environment): (&ShadowMap, &EnvironmentMap),
+        maps: Maps<'_>,
         anaglyph: &Anaglyph,
     ) -> Self {
         let device = &gpu.device;
@@ -66,7 +64,7 @@ impl PictureTarget {
             .views
             .iter()
             .map(|&(eye, part)| {
-                let (uniform, group) = layout.view(device, shadow, environment);
+                let (uniform, group) = layout.view(device, maps);
                 let sampled = wgpu::TextureUsages::TEXTURE_BINDING;
                 let own = || view_of(attachment(device, "eye", size, single, sampled));
                 ViewTarget {

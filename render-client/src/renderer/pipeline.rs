@@ -1,8 +1,9 @@
 //! What the pipelines have in common: formats, the shared bind group, the way to build one.
 
 use super::environment::EnvironmentMap;
-use super::frame::FrameUniform;
+use super::frame::{FrameUniform, OCCLUSION_TEXELS};
 use super::gpu::Gpu;
+use super::occlusion::OcclusionMap;
 use super::resources::{bind, uniform_buffer};
 use super::shadow::ShadowMap;
 
@@ -37,6 +38,9 @@ pub(crate) struct PipelineParts<'a> {
     pub(crate) layer: Layer,
 }
 
+/// What all views read.
+pub(crate) type Maps<'a> = (&'a ShadowMap, &'a EnvironmentMap, &'a OcclusionMap);
+
 /// The shared bind group's layout, and the pipeline layout made of it alone.
 #[derive(Debug)]
 pub(crate) struct FrameLayout {
@@ -67,6 +71,11 @@ impl FrameLayout {
             view_dimension: wgpu::TextureViewDimension::Cube,
             multisampled: false,
         };
+        let occlusion = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: true },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
         let filtering = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
         let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
         let group = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
@@ -77,6 +86,7 @@ impl FrameLayout {
                 entry(2, wgpu::ShaderStages::FRAGMENT, comparison),
                 entry(3, wgpu::ShaderStages::FRAGMENT, environment),
                 entry(4, wgpu::ShaderStages::FRAGMENT, filtering),
+                entry(5, wgpu::ShaderStages::FRAGMENT, occlusion),
             ],
         });
         let pipeline = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -91,8 +101,7 @@ impl FrameLayout {
     pub(crate) fn view(
         &self,
         device: &wgpu::Device,
-        shadow: &ShadowMap,
-        environment: &EnvironmentMap,
+        (shadow, environment, occlusion): Maps<'_>,
     ) -> (wgpu::Buffer, wgpu::BindGroup) {
         let buffer = uniform_buffer::<FrameUniform>(device, "frame");
         let resources = [
@@ -101,6 +110,7 @@ impl FrameLayout {
             wgpu::BindingResource::Sampler(&shadow.sampler),
             wgpu::BindingResource::TextureView(&environment.view),
             wgpu::BindingResource::Sampler(&environment.sampler),
+            wgpu::BindingResource::TextureView(&occlusion.view),
         ];
         let group = bind(device, "frame", &self.group, &resources);
         (buffer, group)
@@ -114,8 +124,9 @@ impl FrameLayout {
         parts: &PipelineParts<'_>,
     ) -> wgpu::RenderPipeline {
         let source = format!(
-            "const SMOOTH = {};\n{}\n{}",
+            "const SMOOTH = {};\nconst RADIUS = {OCCLUSION_TEXELS}.0;\n{}\n{}\n{}",
             output.samples > 1,
+            include_str!("../../shaders/covering.wgsl"),
             include_str!("../../shaders/frame.wgsl"),
             parts.source
         );

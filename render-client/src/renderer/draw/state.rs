@@ -32,11 +32,17 @@ impl Renderer {
         let god_object = god_object::instance(stage, &state.god_object);
         add(&stage.god_object, god_object, bounds);
         let moving = usize::from(stage.god_object.opacity >= 1.0);
-        for body in stage.obstacles.iter().filter(|body| body.opacity > 0.0) {
+        let mut all = bounds;
+        let seen = stage.obstacles.iter().enumerate();
+        for (place, body) in seen.filter(|(_, body)| body.opacity > 0.0) {
             let pose = pose_of(body, state);
             let own = self.bounds(stage, body, pose);
-            bounds = bounds.union(&own);
-            add(body, obstacles::instance(stage, body, pose), own);
+            all = all.union(&own);
+            if !self.ground.is(place) {
+                bounds = bounds.union(&own);
+            }
+            let shown = self.ground.shown(place, body);
+            add(body, obstacles::instance(stage, &shown, pose), own);
         }
 
         let (dot, arrow) = (self.meshes.len() - 2, self.meshes.len() - 1);
@@ -58,7 +64,7 @@ impl Renderer {
         });
 
         self.plan = Plan {
-            light: KeyLight::fit(&bounds, ShadowMap::TEXELS),
+            light: KeyLight::fit(&bounds, &all, ShadowMap::TEXELS),
             stale: latched.stale,
             reflections: show.reflections,
             casters,
@@ -106,6 +112,8 @@ impl Renderer {
             pass.set_vertex_buffer(1, self.instances.slice(..));
             self.draw_batches(&mut pass, moving, &per_metre);
         }
+        let (light, floor) = (&self.plan.light, &self.floor);
+        self.occlusion.draw(gpu, &mut encoder, light, floor);
         gpu.queue.submit([encoder.finish()]);
         self.shadowed = Some(wanted);
     }
