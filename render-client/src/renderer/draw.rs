@@ -133,10 +133,7 @@ impl Renderer {
             meshes,
             levels: Mutex::new(made_beside(shaded.into_iter().enumerate().collect())),
             mesh_bounds,
-            god_object_box: {
-                let (low, high) = stage.meshes[stage.god_object.mesh].corners();
-                (stage.god_object.place(&low), stage.god_object.place(&high))
-            },
+            god_object_box: held_box(stage),
             instances,
             floor,
             enclosure: Enclosure {
@@ -362,6 +359,12 @@ impl Renderer {
             self.triangles.fetch_add(drawn, Ordering::Relaxed);
         }
     }
+}
+
+/// Lowest and highest corner of the god-object, body frame.
+fn held_box(stage: &Stage) -> (Point3<f64>, Point3<f64>) {
+    let (low, high) = stage.meshes[stage.god_object.mesh].corners();
+    (stage.god_object.place(&low), stage.god_object.place(&high))
 }
 
 fn ordered(mesh: &TriangleMesh) -> Shaded {

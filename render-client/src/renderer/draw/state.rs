@@ -76,14 +76,10 @@ impl Renderer {
         gpu.queue
             .write_buffer(&self.instances, 0, bytemuck::cast_slice(&list.instances));
         let (held, standing) = self.plan.casters.split_at(moving);
-        let of = |batches: &[Batch]| {
-            let instances = batches.iter().flat_map(|batch| batch.instances.clone());
-            instances.map(|i| list.instances[i as usize]).collect()
-        };
         let shadowed = Shadowed {
             light: self.plan.light,
-            moving: of(held),
-            standing: of(standing),
+            moving: list.of(held),
+            standing: list.of(standing),
         };
         self.draw_shadow(gpu, shadowed);
     }
@@ -130,6 +126,11 @@ struct InstanceList {
 }
 
 impl InstanceList {
+    fn of(&self, batches: &[Batch]) -> Vec<Instance> {
+        let places = batches.iter().flat_map(|batch| batch.instances.clone());
+        places.map(|i| self.instances[i as usize]).collect()
+    }
+
     fn batch(
         &mut self,
         mesh: usize,
