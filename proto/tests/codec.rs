@@ -288,7 +288,7 @@ fn looks_that_are_not_of_the_mesh_are_refused() {
         assert!(with(vec![look(red)], vec![0; 4]).is_err(), "{red}");
     }
     let good = with(vec![look(1.0); 255], vec![0, 254, 0, 0]);
-    let bytes = good.and_then(|mesh| Ok(mesh.encode().unwrap_or_default()));
+    let bytes = good.map(|mesh| mesh.encode().unwrap_or_default());
     let bytes = bytes.unwrap_or_default();
     for length in 0..bytes.len() {
         let cut = MeshBlob::decode(&bytes[..length]);

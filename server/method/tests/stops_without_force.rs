@@ -80,7 +80,7 @@ proptest! {
 
     #[test]
     fn what_stops_the_body_without_a_force_is_reported(
-        x in -5e-3..5e-3, y in -0.02..0.02, turn in 0.0..6.28,
+        x in -5e-3..5e-3, y in -0.02..0.02, turn in 0.0..std::f64::consts::TAU,
     ) {
         // Onto the side that looks inward: held, and nothing is felt.
         let (force, stops) = led([TOP + 4.0 * HALF, TOP], [x, y], turn);

@@ -147,7 +147,7 @@ impl Materials {
             )),
         }
         let parts = match merged {
-            Some(_) if places.len() <= MAX_LOOKS => self.parts(&of),
+            Some(_) if places.len() <= MAX_LOOKS => self.parts(of),
             _ => Vec::new(),
         };
         // A library that cannot be read is said above, and may define them.

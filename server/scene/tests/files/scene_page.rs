@@ -13,13 +13,18 @@ const MAX_DEPTH: usize = 6;
 
 type Tables = BTreeMap<String, BTreeSet<String>>;
 
-/// `shape` and `pose` are the same in the god-object as in an obstacle and in scenery.
+/// `shape` and `pose` are the same in the god-object as in an obstacle and in scenery, and what is drawn is a shape.
 fn table_name(name: &str) -> String {
     for owner in ["[god_object] ", "[[obstacle]] ", "[[scenery]] "] {
         if let Some(inner) = name.strip_prefix(owner)
             && ["shape", "pose"].contains(&inner.split(' ').next().unwrap_or_default())
         {
             return inner.to_owned();
+        } else if let Some(inner) = name
+            .strip_prefix(owner)
+            .and_then(|n| n.strip_prefix("visual"))
+        {
+            return format!("shape{inner}");
         }
     }
     name.to_owned()
@@ -42,8 +47,8 @@ fn complaints(scene: &Scene, assignment: &str) -> Vec<(String, BTreeSet<String>)
 
 /// Every table that the parser reads, found by asking: whatever key it knows may be a table.
 fn known() -> Tables {
-    let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { mesh = \"a.ply\" }\n\
-                [[obstacle]]\nname = \"o\"\nshape = { mesh = \"a.ply\" }\n\
+    let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { mesh = \"a.ply\" }\nvisual = { mesh = \"a.ply\" }\n\
+                [[obstacle]]\nname = \"o\"\nshape = { mesh = \"a.ply\" }\nvisual = { mesh = \"a.ply\" }\n\
                 [[scenery]]\nname = \"s\"\nshape = { mesh = \"a.ply\" }\n";
     let scene = Scene::parse("s.toml", text, Path::new("")).unwrap();
     let mut tables = Tables::new();
@@ -53,7 +58,7 @@ fn known() -> Tables {
             "" => format!("{UNKNOWN}=1"),
             // What is there already keeps its keys: some are known only beside others.
             "god_object" | "god_object.shape" | "obstacle.0" | "obstacle.0.shape" | "scenery.0"
-            | "scenery.0.shape" => {
+            | "scenery.0.shape" | "god_object.visual" | "obstacle.0.visual" => {
                 format!("{path}.{UNKNOWN}=1")
             }
             _ => format!("{path}={{{UNKNOWN}=1}}"),
