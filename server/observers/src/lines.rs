@@ -360,7 +360,11 @@ mod tests {
             (&tool["force_limited"], &tool["device_silent"]),
             (&json!(true), &json!(false))
         );
-        assert_eq!(line["head"]["tracked"], json!(true));
+        let head = &line["head"];
+        assert_eq!(
+            (&head["tracked"], &head["age"]),
+            (&json!(true), &json!(0.0))
+        );
         assert_eq!(line["bodies"][0]["obstacle"], json!(3));
         assert_eq!(line["contacts"][0]["normal"], json!([0.0, 0.0, 1.0]));
     }

@@ -14,10 +14,10 @@ mod placing;
 mod repair;
 mod report;
 mod scene_text;
-mod seen;
 mod shell;
 mod stitch;
 mod unit;
+mod visual;
 mod weld;
 
 use std::path::PathBuf;
@@ -38,7 +38,7 @@ use hand_path::hand_path;
 use part::{Part, new_name, part};
 use placing::{move_to_origin, note_up};
 use scene_text::{HAND_SECTION, Placed, around, clear_above, scene_text, sphere_radius};
-use seen::Seen;
+use visual::Visual;
 
 /// Name of the scene file in the folder.
 const SCENE_FILE: &str = "scene.toml";
@@ -82,18 +82,19 @@ pub fn import_unless(
 ) -> Result<ImportReport, FileError> {
     // What cannot be made is refused before the work; nothing is there while it lasts.
     drop(NewFolder::create(&request.folder)?);
-    let (mut parts, mut seen) = read_parts(request)?;
+    let (mut parts, mut visuals) = read_parts(request)?;
     let mut notes = Vec::new();
     note_up(request, &mut notes);
     if let Some(way) = move_to_origin(&mut parts, &mut notes) {
-        seen.iter_mut()
+        visuals
+            .iter_mut()
             .flatten()
-            .for_each(|seen| seen.move_by(&way));
+            .for_each(|visual| visual.move_by(&way));
     }
     let placed: Vec<Placed> = parts
         .iter()
-        .zip(&seen)
-        .map(|((report, mesh), seen)| {
+        .zip(&visuals)
+        .map(|((report, mesh), visual)| {
             let (low, high) = mesh
                 .bounds()
                 .unwrap_or((Point3::origin(), Point3::origin()));
@@ -101,7 +102,7 @@ pub fn import_unless(
                 body: report.body.clone(),
                 mesh_file: report.mesh_file.clone(),
                 appearance: report.appearance,
-                seen_file: seen.as_ref().map(Seen::file),
+                visual_file: visual.as_ref().map(Visual::file),
                 low,
                 high,
             }
@@ -117,10 +118,10 @@ pub fn import_unless(
     go_on()?;
     let folder = NewFolder::create(&request.folder)?;
     let mut reports = Vec::with_capacity(parts.len());
-    for ((report, mesh), seen) in parts.into_iter().zip(seen) {
+    for ((report, mesh), visual) in parts.into_iter().zip(visuals) {
         go_on()?;
         folder.write(&report.mesh_file, &write_ply(&mesh))?;
-        for (name, text) in seen.iter().flat_map(Seen::files) {
+        for (name, text) in visual.iter().flat_map(Visual::files) {
             folder.write(&name, text.as_bytes())?;
         }
         reports.push(report);
@@ -141,13 +142,13 @@ pub fn import_unless(
 }
 
 /// Reports and surfaces of all parts, and what is drawn instead of some.
-type ReadParts = (Vec<(PartReport, RawMesh)>, Vec<Option<Seen>>);
+type ReadParts = (Vec<(PartReport, RawMesh)>, Vec<Option<Visual>>);
 
 /// All parts, or all faults of all parts.
 fn read_parts(request: &ImportRequest) -> Result<ReadParts, FileError> {
     let mut problems = Vec::new();
     let mut names = RESERVED_NAMES.map(str::to_owned).to_vec();
-    let (mut parts, mut all_seen) = (Vec::new(), Vec::new());
+    let (mut parts, mut visuals) = (Vec::new(), Vec::new());
     let mut names_found = vec![false; request.only.len()];
     for (index, path) in request.parts.iter().enumerate() {
         let own = new_name(path, &mut names);
@@ -157,14 +158,14 @@ fn read_parts(request: &ImportRequest) -> Result<ReadParts, FileError> {
             Ok(Part {
                 report,
                 mesh,
-                seen,
+                visual,
                 pieces,
             }) => {
                 for (found, name) in names_found.iter_mut().zip(&request.only) {
                     *found |= pieces.has(name);
                 }
                 parts.push((report, mesh));
-                all_seen.push(seen);
+                visuals.push(visual);
             }
             Err(error) => problems.extend(error.into_problems()),
         }
@@ -179,7 +180,7 @@ fn read_parts(request: &ImportRequest) -> Result<ReadParts, FileError> {
         }));
     }
     FileError::unless_empty(problems)?;
-    Ok((parts, all_seen))
+    Ok((parts, visuals))
 }
 
 /// Writes the scene with the held body where its file puts it or, where it would touch the others, above them.

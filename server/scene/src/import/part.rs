@@ -7,7 +7,7 @@ use god_object::Mesh;
 use super::placing::upright;
 use super::repair::{Repaired, Wishes, is_single, repair};
 use super::report::{Finding, PartReport, Places};
-use super::seen::Seen;
+use super::visual::Visual;
 use super::{ImportRequest, unit};
 use crate::appearance::Appearance;
 use crate::check::{Meeting, MeshFigures};
@@ -24,7 +24,7 @@ pub(super) struct Part {
     pub(super) report: PartReport,
     pub(super) mesh: RawMesh,
     /// What is drawn instead, where its triangles do not all look alike.
-    pub(super) seen: Option<Seen>,
+    pub(super) visual: Option<Visual>,
     /// Of its file.
     pub(super) pieces: Pieces,
 }
@@ -72,7 +72,6 @@ pub(super) fn part(
     request: &ImportRequest,
 ) -> Result<Part, FileError> {
     let MeshPart { mesh, look, pieces } = read(path, &request.only)?;
-    let lost = look.not_drawn(&Appearance::default(), &mesh);
     let as_read = (!look.parts.is_empty()).then(|| mesh.clone());
     // A vertex of no triangle is no part of the surface, however far away it is.
     let raw = mesh.without_unused();
@@ -95,8 +94,17 @@ pub(super) fn part(
         FileError::of_all(faults.into_iter().map(of_file).collect())
     })?;
     drop(progress);
-    let seen = as_read.and_then(|mesh| {
-        Seen::of(mesh, &look, mesh_file, |mesh| {
+    // A face that was turned, or that has a back now, would be seen from its wrong side in the surface of the file.
+    let turned = |finding: &Finding| ["triangles-turned", "parts-turned"].contains(&finding.kind);
+    let faces_as_before = thickened.is_none() && !findings.iter().any(turned);
+    let as_read = as_read.filter(|_| faces_as_before);
+    let one_look = RawMesh::default();
+    let lost = look.not_drawn(
+        &Appearance::default(),
+        as_read.as_ref().unwrap_or(&one_look),
+    );
+    let visual = as_read.and_then(|mesh| {
+        Visual::of(mesh, &look, mesh_file, |mesh| {
             upright(mesh.scaled(unit.metres), request.up)
         })
     });
@@ -130,7 +138,7 @@ pub(super) fn part(
     Ok(Part {
         report,
         mesh: raw,
-        seen,
+        visual,
         pieces,
     })
 }

@@ -30,7 +30,7 @@ pub(super) struct Placed {
     pub(super) mesh_file: String,
     pub(super) appearance: Appearance,
     /// Of a surface that is drawn instead, with its own looks.
-    pub(super) seen_file: Option<String>,
+    pub(super) visual_file: Option<String>,
     pub(super) low: Point3<f64>,
     pub(super) high: Point3<f64>,
 }
@@ -126,7 +126,7 @@ pub(super) fn scene_text(
 fn write_look(text: &mut String, part: &Placed) {
     let mut appearance = part.appearance;
     // Writing to a String cannot fail.
-    if let Some(file) = &part.seen_file {
+    if let Some(file) = &part.visual_file {
         let _ = writeln!(
             text,
             "visual = {{ mesh = {} }}    # drawn instead, with the looks of its materials; color = \"...\" gives all of it one",

@@ -29,7 +29,7 @@ const DRAWN_MERIDIANS: usize = 48;
 const DRAWN_SIDES: usize = 72;
 
 /// What is drawn of a body: form, mesh and look.
-type Seen<'s> = (&'s Shape, RawMesh, FileLook);
+type Drawn<'s> = (&'s Shape, RawMesh, FileLook);
 
 impl Scene {
     /// Loads and generates the meshes and checks that the method can work on them. All faults are reported.
@@ -196,7 +196,7 @@ impl Scene {
         body: &Mesh,
         obstacles: &[Obstacle],
         looks: &[FileLook],
-        visuals: Vec<Option<Seen<'_>>>,
+        visuals: Vec<Option<Drawn<'_>>>,
     ) -> (Vec<BuiltBody>, BTreeSet<String>) {
         let held = &self.spec.god_object;
         let held = (
@@ -220,7 +220,7 @@ impl Scene {
                 Some((shape, raw, look)) => (shape, raw, look),
                 None => (shape, raw_of(mesh), look.clone()),
             };
-            let (body, lost_of) = seen((name, pose, said), shape, raw, &look);
+            let (body, lost_of) = drawn_body((name, pose, said), shape, raw, &look);
             bodies.push(body);
             lost.extend(lost_of);
         }
@@ -228,7 +228,7 @@ impl Scene {
     }
 
     /// What is drawn of bodies instead of their forms: form, mesh and look; the god-object first.
-    fn visuals<'s>(&'s self, problems: &mut Vec<Problem>) -> Vec<Option<Seen<'s>>> {
+    fn visuals<'s>(&'s self, problems: &mut Vec<Problem>) -> Vec<Option<Drawn<'s>>> {
         let obstacles = self.spec.obstacles.iter().map(|o| &o.visual);
         let all = std::iter::once(&self.spec.god_object.visual).chain(obstacles);
         let mut read = |visual: Option<&'s VisualSpec>| {
@@ -247,7 +247,7 @@ impl Scene {
             match self.raw_mesh(&spec.shape, &spec.shape_at) {
                 Ok((mesh, look)) => {
                     let of = (spec.name.as_str(), spec.pose, &spec.appearance);
-                    let (body, lost_of) = seen(of, &spec.shape, mesh, &look);
+                    let (body, lost_of) = drawn_body(of, &spec.shape, mesh, &look);
                     scenery.push(body);
                     lost.extend(lost_of);
                 }
@@ -438,7 +438,7 @@ fn simplify_as_asked(
 
 /// What the file of a shape says of its look and nobody sees.
 /// A body as it is drawn, and what is lost of the look of its file.
-fn seen(
+fn drawn_body(
     (name, pose, said): (&str, Pose, &Appearance),
     shape: &Shape,
     mesh: RawMesh,

@@ -7,20 +7,20 @@ use taut_scene::{
     FileKind, FileReport, SHIPPED_WORKBENCH, check, read_mesh, shipped_scene_text, write_ply,
 };
 
-struct Folder(tempfile::TempDir);
+pub(super) struct Folder(pub(super) tempfile::TempDir);
 
 impl Folder {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self(tempfile::tempdir().unwrap())
     }
 
-    fn file(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+    pub(super) fn file(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.path().join(name);
         std::fs::write(&path, content).unwrap();
         path
     }
 
-    fn check(&self, name: &str, content: impl AsRef<[u8]>) -> FileReport {
+    pub(super) fn check(&self, name: &str, content: impl AsRef<[u8]>) -> FileReport {
         check(&[self.file(name, content)]).remove(0)
     }
 }

@@ -220,6 +220,38 @@ fn an_imported_part_is_seen_with_the_looks_of_its_file() {
 }
 
 #[test]
+fn a_part_that_import_turned_is_drawn_as_it_is_felt() {
+    let folder = Folder::new();
+    let cube = cuboid([0.01, 0.02, 0.03]);
+    let mut text = String::from("mtllib a.mtl\n");
+    for v in &cube.vertices {
+        text += &format!("v {} {} {}\n", v.x, v.y, v.z);
+    }
+    for (place, [a, b, c]) in cube.triangles.iter().enumerate() {
+        // Inside out: its own faces would be seen from within.
+        text += &format!("usemtl m{}\nf {} {} {}\n", place % 2, a + 1, c + 1, b + 1);
+    }
+    folder.write("a.mtl", "newmtl m0\nKd 1 0 0\nnewmtl m1\nKd 0 1 0\n");
+    let report = import(&ImportRequest {
+        parts: vec![folder.write("a.obj", text)],
+        folder: folder.0.path().join("made"),
+        unit: Some("m".parse().unwrap()),
+        ..ImportRequest::default()
+    });
+    let report = report.unwrap();
+    let said = report.to_string();
+    assert!(
+        said.contains("inside out") && said.contains("of its materials"),
+        "{said}"
+    );
+    let scene = std::fs::read_to_string(&report.scene).unwrap();
+    assert!(
+        !scene.contains("visual") && scene.contains("color"),
+        "{scene}"
+    );
+}
+
+#[test]
 fn what_is_drawn_may_be_another_form_than_what_is_felt() {
     let folder = Folder::new();
     folder.gltf("a.gltf", &format!("{STEEL},{RED}"), "");

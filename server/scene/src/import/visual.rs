@@ -9,7 +9,7 @@ use crate::mesh_file::{FileLook, RawMesh};
 
 /// A surface with looks.
 #[derive(Clone, Debug)]
-pub(super) struct Seen {
+pub(super) struct Visual {
     mesh: RawMesh,
     /// Lengths of runs of its triangles, with how each looks.
     parts: Vec<(Appearance, usize)>,
@@ -17,7 +17,7 @@ pub(super) struct Seen {
     name: String,
 }
 
-impl Seen {
+impl Visual {
     /// Of a part's file, where that says more than one look; `placed` brings its mesh to where the part stands.
     pub(super) fn of(
         mesh: RawMesh,
@@ -32,7 +32,7 @@ impl Seen {
         (!parts.is_empty()).then(|| Self {
             mesh: placed(mesh),
             parts,
-            name: format!("{stem}-seen"),
+            name: format!("{stem}-visual"),
         })
     }
 
