@@ -1,13 +1,15 @@
 //! What is worth a look in the bodies of a scene: their surfaces and sizes.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+
+use god_object::Mesh;
 
 use super::lengths::length_text;
-use super::surface::judge;
+use super::surface::judge_mesh;
 use crate::document::At;
 use crate::import::LengthUnit;
 use crate::problem::Problem;
-use crate::scene::{BuiltScene, Scene, Shape, unusable};
+use crate::scene::{BuiltScene, GOD_OBJECT_NAME, Scene, Shape, unusable};
 
 /// A body longer than this, m, is probably in millimetres; a shorter one was probably scaled twice.
 pub(crate) const SUSPICIOUS_SIZES: [f64; 2] = [5e-4, 5.0];
@@ -21,36 +23,37 @@ pub(super) struct Bodies {
     pub(super) sizes: Vec<String>,
 }
 
-/// Looks at the meshes that are used: scaled, simplified.
+/// Looks at the meshes that are felt: scaled, simplified.
 pub(super) fn look_at(scene: &Scene, built: &BuiltScene) -> Bodies {
     let mut found = Bodies::default();
-    let meshes: HashMap<&str, _> = built
-        .bodies
-        .iter()
-        .map(|body| (body.name.as_str(), &body.mesh))
-        .collect();
+    let meshes: HashMap<&str, &Mesh> = felt(built).collect();
     // A form that several bodies have is judged once.
-    let mut judged: HashMap<String, ()> = HashMap::new();
+    let mut judged = HashSet::new();
     for (name, shape, at) in scene.bodies_from_files() {
         let Some(mesh) = meshes.get(name) else {
             continue;
         };
-        let Some((low, high)) = mesh.bounds() else {
-            continue;
-        };
+        let [low, high] = mesh.bounding_box();
         let longest = (high - low).max();
         found.sizes.push(format!("{name} {}", length_text(longest)));
         found.notes.extend(doubt_in_scene(name, shape, longest));
-        if judged.insert(format!("{shape:?}"), ()).is_none() {
-            judge_body(shape, at, (*mesh).clone(), &mut found);
+        if judged.insert(format!("{shape:?}")) {
+            judge_body(shape, at, mesh, &mut found);
         }
     }
     found
 }
 
-fn judge_body(shape: &Shape, at: &At, mesh: crate::mesh_file::RawMesh, found: &mut Bodies) {
+/// What is felt of each body, by its name: the god-object first.
+pub(super) fn felt(built: &BuiltScene) -> impl Iterator<Item = (&str, &Mesh)> {
+    let obstacles = built.world.obstacles.iter();
+    let obstacles = obstacles.map(|obstacle| (obstacle.name.as_str(), &obstacle.mesh));
+    std::iter::once((GOD_OBJECT_NAME, &built.world.body.mesh)).chain(obstacles)
+}
+
+fn judge_body(shape: &Shape, at: &At, mesh: &Mesh, found: &mut Bodies) {
     let file = shape.file().unwrap_or_default();
-    let judged = judge(mesh, file);
+    let judged = judge_mesh(mesh, file);
     let faults = judged.faults.iter();
     found
         .problems

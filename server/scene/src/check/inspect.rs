@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::bodies::{doubt_in_file, look_at};
+use super::bodies::{doubt_in_file, felt, look_at};
 use super::lengths::length_text;
 use super::report::{FileKind, FileReport};
 use super::surface::judge;
@@ -227,10 +227,8 @@ fn add_scene(scene: Result<Scene, FileError>, found: &mut Found) {
 }
 
 fn summary(built: &BuiltScene, sizes: &[String]) -> String {
-    let triangles: Vec<String> = built
-        .bodies
-        .iter()
-        .map(|b| format!("{} {}", b.name, b.mesh.triangles.len()))
+    let triangles: Vec<String> = felt(built)
+        .map(|(name, mesh)| format!("{name} {}", mesh.triangles().len()))
         .collect();
     let (mass, stiffness) = (built.world.body.mass, built.stiffness());
     let mut exact: Vec<&str> = Vec::new();

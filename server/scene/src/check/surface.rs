@@ -20,25 +20,40 @@ pub(crate) struct Judged {
 
 /// Judges the surface of this file.
 pub(crate) fn judge(raw: RawMesh, file: &str) -> Judged {
-    let mut figures = MeshFigures::of(&raw);
-    let mut faults: Vec<String> = figures.faults().iter().map(ToString::to_string).collect();
-    let mut notes = Vec::new();
+    let mut judged = Judged::by_sides(&raw);
     match Mesh::new(raw.vertices, raw.triangles) {
-        Ok(mesh) => {
-            figures.meeting = Meeting::of(&mesh, file);
-            match &figures.meeting {
-                Some(meeting) if meeting.inverted_m.is_some() => faults.push(meeting.text()),
-                Some(meeting) => notes.push(meeting.text()),
-                None => {}
-            }
-        }
-        Err(error) if faults.is_empty() => faults.push(error.to_string()),
+        Ok(mesh) => judged.look_where_it_meets(&mesh, file),
+        Err(error) if judged.faults.is_empty() => judged.faults.push(error.to_string()),
         Err(_) => {}
     }
-    Judged {
-        figures,
-        faults,
-        notes,
+    judged
+}
+
+/// Judges a surface of this file that the method can work on.
+pub(crate) fn judge_mesh(mesh: &Mesh, file: &str) -> Judged {
+    let mut judged = Judged::by_sides(&RawMesh::from(mesh));
+    judged.look_where_it_meets(mesh, file);
+    judged
+}
+
+impl Judged {
+    /// By its edges and parts alone.
+    fn by_sides(raw: &RawMesh) -> Self {
+        let figures = MeshFigures::of(raw);
+        Self {
+            faults: figures.faults().iter().map(ToString::to_string).collect(),
+            notes: Vec::new(),
+            figures,
+        }
+    }
+
+    fn look_where_it_meets(&mut self, mesh: &Mesh, file: &str) {
+        self.figures.meeting = Meeting::of(mesh, file);
+        match &self.figures.meeting {
+            Some(meeting) if meeting.inverted_m.is_some() => self.faults.push(meeting.text()),
+            Some(meeting) => self.notes.push(meeting.text()),
+            None => {}
+        }
     }
 }
 

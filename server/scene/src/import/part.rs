@@ -116,7 +116,7 @@ pub(super) fn part(
         None => (mesh, None),
     };
     let meeting = felt_meeting(&mesh, path, thickened.is_some()).map_err(fail)?;
-    let raw = upright(raw_of(&mesh), request.up);
+    let raw = upright(RawMesh::from(&mesh), request.up);
     findings.splice(0..0, told_of_file(&pieces, &request.only));
     let mut report = PartReport {
         file: path.display().to_string(),
@@ -219,13 +219,6 @@ fn told_at_last(meeting: Option<Meeting>, lost: Option<String>) -> Vec<Finding> 
         told.push(finding);
     }
     told
-}
-
-fn raw_of(mesh: &Mesh) -> RawMesh {
-    RawMesh {
-        vertices: mesh.vertices().to_vec(),
-        triangles: mesh.triangles().to_vec(),
-    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use god_object::Mesh;
 use nalgebra::Point3;
 
 /// Vertices and triangles, not yet checked for being a closed surface.
@@ -13,6 +14,15 @@ pub struct RawMesh {
     pub vertices: Vec<Point3<f64>>,
     /// Three places in `vertices` each, anticlockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+}
+
+impl From<&Mesh> for RawMesh {
+    fn from(mesh: &Mesh) -> Self {
+        Self {
+            vertices: mesh.vertices().to_vec(),
+            triangles: mesh.triangles().to_vec(),
+        }
+    }
 }
 
 impl RawMesh {

@@ -218,7 +218,7 @@ impl Scene {
         for (((name, mesh, pose, (shape, said)), look), visual) in all {
             let (shape, raw, look) = match visual {
                 Some((shape, raw, look)) => (shape, raw, look),
-                None => (shape, raw_of(mesh), look.clone()),
+                None => (shape, RawMesh::from(mesh), look.clone()),
             };
             let (body, lost_of) = drawn_body((name, pose, said), shape, raw, &look);
             bodies.push(body);
@@ -454,13 +454,6 @@ fn drawn_body(
         appearance: said.or(look.appearance),
     };
     (body, lost)
-}
-
-fn raw_of(mesh: &Mesh) -> RawMesh {
-    RawMesh {
-        vertices: mesh.vertices().to_vec(),
-        triangles: mesh.triangles().to_vec(),
-    }
 }
 
 /// What a mass adds to the inertia about a point `offset` away (parallel axes).

@@ -60,6 +60,7 @@ fn named_files(root: &Node) -> Vec<(Kind, &Node)> {
         let is_whole = within(body, &["shape", "only"]).is_none();
         let kind = if is_whole { Kind::Mesh } else { Kind::Seen };
         add(kind, within(body, &["shape", "mesh"]));
+        add(Kind::Seen, within(body, &["visual", "mesh"]));
         let map = ["surface", "texture", "height_map", "file"];
         add(Kind::HeightMap, within(body, &map));
         add(Kind::Trace, within(body, &["motion", "trace"]));

@@ -1,5 +1,6 @@
 //! `check` tells surfaces that are felt as they are meant from those that are not.
 
+use super::checks::Folder;
 use god_object::geometry::self_contact;
 use god_object::{Mesh, geometry::one_sided_distance};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -269,4 +270,32 @@ fn a_touch_without_a_crossing_is_no_inverted_lobe() {
     let mesh = Mesh::new(stacked.vertices, stacked.triangles).unwrap();
     let contact = self_contact(&mesh, |_| {}).unwrap();
     assert_eq!(contact.inverted, None);
+}
+
+#[test]
+fn what_is_judged_of_a_body_is_what_is_felt_and_not_what_is_drawn() {
+    let folder = Folder::new();
+    folder.file("eight.ply", write_ply(&eight([0.03, 0.02], 8, 2, 0.05)));
+    folder.file("box.ply", write_ply(&cuboid([0.02, 0.02, 0.02])));
+    folder.file("sheet.obj", "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nf 1 2 3\n");
+    let scene = |felt: &str, drawn: &str| {
+        format!(
+            "name = \"a\"\n[god_object]\nmass = 1.0\nshape = {{ sphere = {{ radius = 0.01 }} }}\n\
+             pose = {{ position = [0.0, 0.0, 0.5] }}\n[[obstacle]]\nname = \"part\"\n\
+             shape = {{ mesh = \"{felt}\" }}\nvisual = {{ mesh = \"{drawn}\" }}\n"
+        )
+    };
+    for drawn in ["sheet.obj", "eight.ply"] {
+        let report = folder.check("good.toml", scene("box.ply", drawn));
+        assert!(report.is_good(), "{report}");
+        assert!(report.to_string().contains("part 12"), "{report}");
+    }
+    let report = folder.check("bad.toml", scene("eight.ply", "box.ply"));
+    assert!(report.to_string().contains("inside out"), "{report}");
+    // The same where the scene has another fault.
+    let faulty = scene("eight.ply", "none.obj") + "speed = 1\n";
+    let all = folder.check("faulty.toml", faulty).to_string();
+    for part in ["`speed`", "inside out", "none.obj"] {
+        assert!(all.contains(part), "{part}: {all}");
+    }
 }
