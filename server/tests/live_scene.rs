@@ -55,6 +55,61 @@ fn serve(changes: &[(&str, &str)], more: &[&str]) -> Served {
     served
 }
 
+/// A ball that a hand carries over a wall and keeps there, and a slab that goes by, far away.
+const OVER_A_WALL: &str = r#"name = "bench"
+[god_object]
+shape = { sphere = { radius = 0.02 } }
+mass = 1.0
+pose = { position = [-0.05, 0.0, 0.05] }
+
+[[obstacle]]
+name = "wall"
+shape = { box = { half_extents = [0.005, 0.1, 0.06] } }
+
+[[obstacle]]
+name = "slab"
+shape = { box = { half_extents = [0.01, 0.01, 0.01] } }
+motion = { trace = "slab.csv" }
+
+[hand]
+path = "over.csv"
+"#;
+const OVER: &str = "t,x,y,z,qw,qx,qy,qz
+0,-0.05,0,0.05,1,0,0,0
+0.5,-0.05,0,0.12,1,0,0,0
+1,0.06,0,0.12,1,0,0,0
+1.5,0.06,0,0.05,1,0,0,0
+";
+const SLAB: &str = "t,x,y,z,qw,qx,qy,qz
+0,0,0,1,1,0,0,0
+1000,10,0,1,1,0,0,0
+";
+
+/// Where the body and what moves are along x, m, as a client of this revision is told.
+fn along_x(served: &Served, revision: u32) -> [f64; 2] {
+    let text = served.text();
+    let server = text.rsplit_once("serving on ").expect("was said").1;
+    let server = server.split(' ').next().expect("an address").to_owned();
+    let key = read_key_file(&served.place.path("cluster.key")).expect("the key");
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+    let options = ClientOptions::new(server, key, Role::Observer, "looker".to_owned());
+    let link = runtime.block_on(connect(options)).expect("in");
+    let mut states = Vec::new();
+    let mut newest = None;
+    wait_until("a state", || {
+        link.drain_states(&mut states);
+        let of = states.last().filter(|s| s.state.scene_revision == revision);
+        newest = of.map(|received| {
+            let state = &received.state;
+            let [body, slab] = [&state.tools[0].god_object, &state.bodies[0].pose];
+            [body, slab].map(|pose| f64::from(pose.position[0]))
+        });
+        newest.is_some()
+    });
+    runtime.block_on(link.close());
+    newest.expect("a state")
+}
+
 impl Served {
     fn edit(&self, wish: &Value) -> (u16, String) {
         let body = wish.to_string();
@@ -515,6 +570,73 @@ fn what_is_kept_is_in_the_file_with_its_comments_and_no_other_change_of_the_file
     assert_eq!(served.revision(), 6, "no session for that");
     let (code, said) = served.taut_edit(&["plate.opacity=1"]);
     assert!(code == Some(0) && said.contains("revision 7"), "{said}");
+}
+
+#[test]
+fn a_change_leaves_the_body_and_what_moves_where_they_are() {
+    let place = Workplace::new();
+    for (name, text) in [
+        ("bench.toml", OVER_A_WALL),
+        ("over.csv", OVER),
+        ("slab.csv", SLAB),
+    ] {
+        place.write(name, text);
+    }
+    let served = Served::start_in(place, &bench(&[]), &["--follow-scene"]);
+    let (mut revision, mut slab) = (1, 0.0);
+    wait_until("the hand is beyond the wall", || {
+        let [body, moves] = along_x(&served, 1);
+        slab = moves;
+        (body - 0.06).abs() < 1e-3
+    });
+    // From the start the wall would be in the way.
+    let edits = [
+        "wall.surface.friction=0.4",
+        "coupling.k_h=1500",
+        "wall.color=#30c030",
+    ];
+    for edit in edits {
+        let (code, said) = served.taut_edit(&[edit]);
+        assert!(code == Some(0) && !said.contains("start"), "{edit}: {said}");
+        revision += 1;
+        let [body, moves] = along_x(&served, revision);
+        assert!(
+            (body - 0.06).abs() < 1e-3,
+            "{edit}: the body is at {body} m"
+        );
+        assert!(moves >= slab, "{edit}: from {slab} m to {moves} m");
+        slab = moves;
+    }
+    let text = served.file().replace("mass = 1.0", "mass = 1.2");
+    served.place.write("bench.toml", &text);
+    revision += 1;
+    wait_until("the file is followed", || {
+        served.revision() == u64::from(revision)
+    });
+    let [body, moves] = along_x(&served, revision);
+    assert!(
+        (body - 0.06).abs() < 1e-3 && moves >= slab,
+        "{body} {moves}"
+    );
+
+    // Where it is, something else is to be: from the start it comes to the near side of that.
+    let (code, said) = served.taut_edit(&["wall.pose.position=[0.06, 0.0, 0.0]"]);
+    let why = "begins at the scene's start and not where it was: there it would be in \"wall\"";
+    assert!(code == Some(0) && said.contains(why), "{said}");
+    assert!(served.says(&[why]));
+    revision += 1;
+    let [body, moves] = along_x(&served, revision);
+    assert!(body < 0.06 - 0.005 - 0.0199, "{body}");
+    assert!(moves < slab, "all of it begins: {moves} m after {slab} m");
+
+    // Chosen anew it begins anew.
+    std::thread::sleep(Duration::from_secs(2));
+    let [_, slab] = along_x(&served, revision);
+    let (status, said) = served.edit(&json!({ "scene": "bench.toml" }));
+    assert_eq!(status, 200, "{said}");
+    revision += 1;
+    let [_, moves] = along_x(&served, revision);
+    assert!(moves < slab, "from {slab} m to {moves} m");
 }
 
 #[test]

@@ -9,6 +9,7 @@ use super::buttons::Buttons;
 use super::clamp::{Clamped, clamp};
 use super::energy::EnergyObserver;
 use super::event::{EdgeDetector, EventKind, Events, TickEvents, kind_of_fault};
+use super::gone::Gone;
 use super::motion::Motion;
 use super::passivity::PassivityController;
 use super::settings::SafetySettings;
@@ -137,6 +138,21 @@ impl DevicePort {
     #[must_use]
     pub fn info(&self) -> &DeviceInfo {
         self.device.info()
+    }
+
+    /// The device alone, for another port; it renders no force from here on.
+    #[must_use]
+    pub fn into_device(mut self) -> Box<dyn Device> {
+        self.say_last_word();
+        let gone = Gone::instead_of(self.device.info());
+        std::mem::replace(&mut self.device, gone)
+    }
+
+    fn say_last_word(&mut self) {
+        if *self.slew.rendered() != Vector6::zeros() {
+            let now = self.last_tick.unwrap_or_default();
+            self.device.write(now, &Vector6::zeros());
+        }
     }
 
     /// Limits and times in force.
@@ -489,9 +505,6 @@ fn is_finite(wrench: &Vector6<f64>) -> bool {
 impl Drop for DevicePort {
     /// The last word to the device, whatever ends the port: a loop that broke down and could not lead the force down leaves none all the same.
     fn drop(&mut self) {
-        if *self.slew.rendered() != Vector6::zeros() {
-            let now = self.last_tick.unwrap_or_default();
-            self.device.write(now, &Vector6::zeros());
-        }
+        self.say_last_word();
     }
 }

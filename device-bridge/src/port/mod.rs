@@ -24,6 +24,7 @@ mod clamp;
 mod device_port;
 mod energy;
 mod event;
+mod gone;
 mod motion;
 mod passivity;
 mod settings;

@@ -563,6 +563,15 @@ fn a_port_that_is_dropped_leaves_no_force() {
 }
 
 #[test]
+fn a_device_that_is_taken_out_of_its_port_renders_no_force() {
+    let stage = Stage::armed(SafetySettings::default(), force(10.0));
+    let written = Arc::clone(&stage.written);
+    let device = stage.port.into_device();
+    assert_eq!(*written.lock().expect("whole"), Vector6::zeros());
+    assert_eq!(device.info().actuated_degrees_of_freedom, 6);
+}
+
+#[test]
 fn a_wall_met_faster_than_the_slew_limit_is_felt_as_it_is() {
     // 1000 N/m at 0.9 m/s: 0.9 N/ms, in either direction; the force answers the sample before.
     for sign in [1.0, -1.0] {

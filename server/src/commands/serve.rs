@@ -52,10 +52,16 @@ pub(super) fn run(
     loop {
         scene.begin(&mut next);
         admission.begin(&mut next.setup.link.policy);
+        if !next.goes_on {
+            kept.handover = None;
+        }
         let mut session = Session::start_with(next.setup, &mut kept)?;
         session.end_with(&end);
         scene.began(&session);
         announce(&session, terminal);
+        if let Some(sentence) = session.beginning().sentence() {
+            terminal.say(&sentence);
+        }
         if matches!(&workbench.device, Device::Driver(chosen) if chosen.kind.has_motors) {
             // Somebody holds it: a person arms.
             terminal.say(HELP_ARM);
@@ -76,7 +82,7 @@ pub(super) fn run(
         terminal.end_status();
         match other {
             Some(changed) => {
-                let (report, failure) = session.make_way(terminal);
+                let (report, failure) = session.make_way(terminal, &mut kept);
                 if let Some(failure) = failure {
                     return Ok((report, Some(failure)));
                 }

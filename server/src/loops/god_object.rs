@@ -32,8 +32,11 @@ const SET_PERIOD: Duration = Duration::from_millis(1);
 pub struct GodObjectLoop {
     god_object: GodObject,
     motions: Vec<BuiltMotion>,
-    /// Session time of the first update, at which the obstacles' traces begin.
+    /// Session time of the first update, at which the obstacles' traces begin or go on.
     began: Option<Duration>,
+    /// Time on the traces then, and now.
+    gone_on_from: Duration,
+    on_traces: Duration,
     device: Subscriber<DeviceState>,
     shaded: Subscriber<Option<ShadedAcceleration>>,
     contacts: Publisher<ContactSnapshot>,
@@ -50,6 +53,17 @@ pub struct UpdateTaps {
     pub updates: Tap<UpdateRecord>,
     /// The rows of its set.
     pub constraints: Tap<ConstraintRecord>,
+}
+
+/// Where the body and what it can touch stand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stand {
+    /// World from body.
+    pub body: Pose,
+    /// World from obstacle, for each.
+    pub obstacles: Vec<Pose>,
+    /// Time on the traces of those that move.
+    pub on_traces: Duration,
 }
 
 /// What loop 1 says about itself.
@@ -84,6 +98,8 @@ impl GodObjectLoop {
             god_object,
             motions: Vec::new(),
             began: None,
+            gone_on_from: Duration::ZERO,
+            on_traces: Duration::ZERO,
             device,
             shaded,
             contacts,
@@ -104,6 +120,25 @@ impl GodObjectLoop {
         note_obstacles(&self.motions, &self.god_object, &mut self.snapshot.moving);
         self.contacts.publish(&self.snapshot);
         self
+    }
+
+    /// The same with traces that go on from `on_traces` and do not begin.
+    #[must_use]
+    pub fn going_on_from(self, on_traces: Duration) -> Self {
+        Self {
+            gone_on_from: on_traces,
+            on_traces,
+            ..self
+        }
+    }
+
+    /// Where everything stands now.
+    pub fn stand(&self) -> Stand {
+        Stand {
+            body: *self.god_object.pose(),
+            obstacles: self.god_object.obstacle_poses().copied().collect(),
+            on_traces: self.on_traces,
+        }
     }
 
     /// The same with the budget of the scene's fidelity watched.
@@ -186,7 +221,8 @@ impl GodObjectLoop {
             return Duration::ZERO;
         }
         let now = clock();
-        let elapsed = now.saturating_sub(*self.began.get_or_insert(now));
+        let elapsed = self.gone_on_from + now.saturating_sub(*self.began.get_or_insert(now));
+        self.on_traces = elapsed;
         for motion in &self.motions {
             let there = motion.pose_at(elapsed.as_secs_f64());
             self.god_object.move_obstacle(motion.obstacle, &there);

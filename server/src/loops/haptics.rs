@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use god_object::spatial::{Pose, Vector6, angular, linear};
 use taut_bridge::{
-    ArmSwitch, ArmWish, Command, DevicePort, ExternalWrench, Felt, Reading, TickReport,
+    ArmSwitch, ArmWish, Command, Device, DevicePort, ExternalWrench, Felt, Reading, TickReport,
 };
 use taut_recording::{HapticsRecord, Tap};
 
@@ -188,6 +188,11 @@ impl HapticsLoop {
     /// What stands between this loop and the device.
     pub fn port(&self) -> &DevicePort {
         &self.port
+    }
+
+    /// The device alone, for another loop.
+    pub fn into_device(self) -> Box<dyn Device> {
+        self.port.into_device()
     }
 
     /// One period: read, publish, wake the coupling, render the newest wrench.

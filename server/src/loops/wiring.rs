@@ -1,6 +1,7 @@
 //! Figure 3 put together: the three loops, the shared data between them, and the ends for those who only look on.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use god_object::{Coupling, GodObject, Settings, World};
 use taut_bridge::{ArmSwitch, Device, DevicePort, ExternalWrench, SafetySettings};
@@ -186,6 +187,15 @@ impl WiredLoops {
     pub fn with_motions(self, motions: Vec<BuiltMotion>) -> Self {
         Self {
             god_object: self.god_object.with_motions(motions),
+            ..self
+        }
+    }
+
+    /// The same with the traces of those obstacles gone on from there.
+    #[must_use]
+    pub fn going_on_from(self, on_traces: Duration) -> Self {
+        Self {
+            god_object: self.god_object.going_on_from(on_traces),
             ..self
         }
     }

@@ -6,6 +6,7 @@ use crate::report::SessionReport;
 use crate::report::terminal::Terminal;
 use crate::session::monitor::{MonitorFeed, Severity};
 use crate::session::observers::ObserverServices;
+use crate::session::operator::Continuity;
 use crate::shared::failure::Failure;
 
 use super::Session;
@@ -16,10 +17,17 @@ impl Session {
         self.conclude(terminal)
     }
 
-    /// The same where another session begins at once: nodes, bridge and observers join that one.
-    pub fn make_way(self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
+    /// The same where another session begins at once: nodes, bridge and observers join that one, and it gets what is left in `kept`.
+    pub(crate) fn make_way(
+        mut self,
+        terminal: &Terminal,
+        kept: &mut Continuity,
+    ) -> (SessionReport, Option<Failure>) {
         self.makes_way.store(true, Ordering::Relaxed);
-        self.conclude(terminal)
+        let (left, before, clock) = (self.left.clone(), self.before.take(), self.clock);
+        let ended = self.conclude(terminal);
+        kept.handover = before.map(|before| left.hand_over(before, clock));
+        ended
     }
 
     fn conclude(mut self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {

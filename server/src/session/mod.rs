@@ -14,6 +14,7 @@ mod end;
 mod external;
 pub(crate) mod file_watch;
 mod frames;
+pub(crate) mod handover;
 pub mod head;
 pub(crate) mod monitor;
 pub(crate) mod observers;
@@ -50,6 +51,7 @@ use crate::loops::statistics::Statistics;
 use crate::report::metrics::Metrics;
 use crate::session::audit::AuditTrail;
 use crate::session::clients::ClientLedger;
+use crate::session::handover::{Before, Beginning, Left};
 use crate::session::monitor::{MonitorFeed, NetworkCounts};
 use crate::session::observers::ObserverServices;
 use crate::session::operator::{Moment, OperatorPage};
@@ -91,6 +93,10 @@ pub struct Session {
     observers: ObserverServices,
     operator: Option<OperatorPage>,
     link: Option<ServerLink>,
+    /// What the loops leave, and what the session was.
+    left: Arc<Left>,
+    before: Option<Before>,
+    beginning: Beginning,
     /// Another session begins when this one ends.
     makes_way: Arc<AtomicBool>,
     runtime: Runtime,
@@ -180,6 +186,11 @@ impl Session {
     /// Asks for force at the device, or for none.
     pub fn arm_switch(&self) -> &Arc<ArmSwitch> {
         &self.arm_switch
+    }
+
+    /// Where the body began.
+    pub(crate) fn beginning(&self) -> &Beginning {
+        &self.beginning
     }
 
     /// Lets `flag` end the session: the loops look at it themselves.

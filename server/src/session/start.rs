@@ -1,6 +1,7 @@
 //! A session built and started: what a scene can be wrong in first, then network, device, loops, monitor.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use god_object::{GodObject, Pose, Settings};
 use taut_bridge::edge::offer_of;
@@ -19,6 +20,7 @@ use crate::session::audit::AuditTrail;
 use crate::session::broadcast::{BridgeCommands, StateWriter};
 use crate::session::clients::ClientLedger;
 use crate::session::edge_sets::EdgeSets;
+use crate::session::handover::{Before, Beginning};
 use crate::session::monitor::{
     FreshRecording, MonitorFeed, MonitorPicture, MonitorSources, Severity,
 };
@@ -55,12 +57,24 @@ impl Session {
     }
 
     /// The same with what outlives the session. A wish for force of before does not count; one for no force does.
-    pub(crate) fn start_with(setup: SessionSetup, kept: &mut Continuity) -> Result<Self, Failure> {
+    pub(crate) fn start_with(
+        mut setup: SessionSetup,
+        kept: &mut Continuity,
+    ) -> Result<Self, Failure> {
         kept.switch.begin_again();
+        let before = Before::of(&setup);
+        let handover = kept.handover.take();
+        let (on_traces, beginning) = match &handover {
+            Some(handover) => handover.place(&mut setup),
+            None => (Duration::ZERO, Beginning::AtStart),
+        };
         let (god_object, checker) = Self::begin(&setup)?;
 
         // The network, whose clock is everybody's; the device may be behind it.
         let clock = SessionClock::start();
+        if let Some(handover) = handover {
+            setup.device = handover.device(setup.device, &setup.device_origin, clock);
+        }
         let ledger = RealtimeLedger::default();
         let runtime = network_runtime(&ledger)?;
         let picture = picture(&setup);
@@ -108,6 +122,7 @@ impl Session {
             taps,
         )
         .with_motions(setup.motions.clone())
+        .going_on_from(on_traces)
         .with_external(external)
         .with_passed(passed_in)
         .with_arm_switch(kept.switch.clone());
@@ -142,7 +157,7 @@ impl Session {
             wrench: loops.readers.status,
             arm_switch: loops.arm_switch.clone(),
             incidents: IncidentCursor::default(),
-            stops_told: (0, std::time::Duration::ZERO),
+            stops_told: (0, Duration::ZERO),
             fidelity,
             network: Arc::default(),
             clients: ClientLedger::default(),
@@ -155,6 +170,9 @@ impl Session {
             observers,
             operator,
             link: Some(link),
+            left: Arc::default(),
+            before: Some(before),
+            beginning,
             makes_way: Arc::default(),
             runtime,
             _awake: awake,

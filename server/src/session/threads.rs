@@ -57,6 +57,7 @@ impl Session {
         realtime: &RealtimeSettings,
     ) -> Result<(), Failure> {
         let (clock, shutdown) = (self.clock, self.shutdown.clone());
+        let left = self.left.clone();
         let beat = Beat {
             period: realtime.god_object_period,
             phase: realtime.phases.god_object,
@@ -75,6 +76,7 @@ impl Session {
                     god_object.tick(|| clock.now());
                     waker.wake();
                 });
+                left.leave_stand(god_object.stand());
             },
         )
     }
@@ -167,6 +169,7 @@ impl Session {
             phase: realtime.phases.haptics,
         };
         let statistics = self.statistics.haptics.clone();
+        let left = self.left.clone();
         self.started = clock.now();
         self.start_thread(
             "haptics",
@@ -187,6 +190,7 @@ impl Session {
                 if let Err(cause) = ticked.and(released) {
                     resume_unwind(cause);
                 }
+                left.leave_device(haptics.into_device());
             },
         )
     }

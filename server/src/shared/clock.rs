@@ -29,6 +29,11 @@ impl SessionClock {
         self.link
     }
 
+    /// How much later this clock began than `earlier` did.
+    pub(crate) fn since(&self, earlier: &Self) -> Duration {
+        self.monotonic_start.saturating_sub(earlier.monotonic_start)
+    }
+
     /// Session time now. Never runs back.
     #[inline]
     pub fn now(&self) -> Duration {

@@ -65,6 +65,7 @@ impl Wanted {
         let mut next = self.loader.change(&self.from, edited)?;
         next.in_file = self.in_file.clone();
         next.not_kept = self.not_kept.clone();
+        next.goes_on = true;
         let named = tell(&keys, &mut next.not_kept);
         Ok(Some((next, named)))
     }

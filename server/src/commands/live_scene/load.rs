@@ -21,6 +21,8 @@ pub(in crate::commands) struct Next {
     pub(super) in_file: Arc<str>,
     /// What of the scene is not in the file.
     pub(super) not_kept: Vec<String>,
+    /// It is the scene that runs, changed: its body stays where it is.
+    pub(in crate::commands) goes_on: bool,
     pub(super) chosen: Option<Chosen>,
     /// Others than before, to be watched.
     pub(super) files: Option<SceneWatch>,
@@ -123,6 +125,7 @@ impl Loader {
         Ok(Next {
             in_file: setup.scene.text().clone(),
             not_kept: Vec::new(),
+            goes_on: false,
             chosen: None,
             files,
             workbench,

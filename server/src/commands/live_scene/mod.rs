@@ -2,7 +2,8 @@
 //!
 //! A file is edited (`--follow-scene`), or an operator sets some keys or chooses another scene. Either way a whole scene comes out, is read and checked as at
 //! the start, and begins another session: the force is led down, the loops are built anew, and nodes, bridge and observers join again as after a restart
-//! of the server. So nothing jumps, and whoever has to arm after a restart has to arm. What cannot be served changes nothing.
+//! of the server. So nothing jumps, and whoever has to arm after a restart has to arm. A body stays where it is where its scene is changed and none is chosen.
+//! What cannot be served changes nothing.
 
 mod change;
 mod files;
@@ -149,11 +150,14 @@ impl LiveScene {
         let Some(Taken {
             asked,
             what,
-            warnings,
+            mut warnings,
         }) = self.taken.take()
         else {
             return;
         };
+        if let Some(where_it_is) = session.beginning().sentence() {
+            warnings.push(where_it_is);
+        }
         PageAudit::edited(asked.peer, self.revision, &what);
         let running = self.running.as_ref();
         let in_file = if running.is_some_and(|running| running.not_kept.is_empty()) {
@@ -209,7 +213,8 @@ impl LiveScene {
         terminal: &Terminal,
     ) -> Option<Next> {
         let (files, running) = (self.files.as_ref()?, self.running.as_ref()?);
-        let next = files.take(terminal, joined(thread))?;
+        let mut next = files.take(terminal, joined(thread))?;
+        next.goes_on = next.workbench.scene == running.from;
         self.gone.clone_from(&running.not_kept);
         if !self.gone.is_empty() {
             terminal.say(&format!(

@@ -9,15 +9,18 @@ use taut_observers::{OperatorServer, OperatorSettings, fresh_token};
 use super::desk::OperatorDesk;
 use super::scene_desk::SceneDesk;
 use super::settings::OperatorSetup;
+use crate::session::handover::Handover;
 use crate::shared::failure::Failure;
 
 /// What the sessions of one process have in common.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Continuity {
     /// Asks for force at the device, or for none.
     pub(crate) switch: Arc<ArmSwitch>,
     /// Where the scene is changed.
     pub(crate) scenes: Arc<SceneDesk>,
+    /// What the session before left to one of the same scene.
+    pub(crate) handover: Option<Handover>,
     door: Option<Arc<OperatorDoor>>,
 }
 

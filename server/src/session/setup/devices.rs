@@ -12,7 +12,7 @@ use taut_bridge::{
 use taut_scene::{BuiltScene, DeviceTrace, HandPreset};
 
 use crate::loops::realtime::thread_cpu_time;
-use crate::session::setup::DeviceSource;
+use crate::session::setup::{DeviceOrigin, DeviceSource};
 use crate::shared::failure::Failure;
 
 /// A hand without a path sways this far to either side, in a cycle of this time: m, s.
@@ -60,6 +60,40 @@ pub fn device(
     }
 }
 
+/// All that the device depends on when it is opened.
+pub(super) fn origin(
+    wanted: &taut_scene::Device,
+    input: Option<&InputChoice>,
+    scene: &BuiltScene,
+    workbench_from_scene: &Pose,
+) -> DeviceOrigin {
+    let files = match wanted {
+        taut_scene::Device::Simulated { path, strings, .. } => {
+            let strings = strings.as_ref().map(Path::new);
+            path.as_deref().into_iter().chain(strings).collect()
+        }
+        taut_scene::Device::Trace { path, .. } => vec![path.as_path()],
+        taut_scene::Device::Driver(_) | taut_scene::Device::Remote => Vec::new(),
+    };
+    let held = |file: &Path| std::fs::read(file).unwrap_or_default();
+    DeviceOrigin {
+        wanted: wanted.clone(),
+        input: input.cloned(),
+        hand: scene.hand.clone(),
+        files: files.into_iter().map(held).collect(),
+        placement: placement(scene, workbench_from_scene),
+    }
+}
+
+fn placement(scene: &BuiltScene, workbench_from_scene: &Pose) -> Placement {
+    let scale = scene.view.display_scale;
+    Placement {
+        start: scene.start,
+        reference_point: scene.reference_point(),
+        workbench_from_world: Similarity3::from_isometry(*workbench_from_scene, scale),
+    }
+}
+
 /// Opens a device; `priority` is for a thread of its driver that a force depends on.
 pub fn input(
     choice: &InputChoice,
@@ -67,14 +101,8 @@ pub fn input(
     workbench_from_scene: &Pose,
     priority: u8,
 ) -> Result<DeviceSource, Failure> {
-    let scale = scene.view.display_scale;
-    let placement = Placement {
-        start: scene.start,
-        reference_point: scene.reference_point(),
-        workbench_from_world: Similarity3::from_isometry(*workbench_from_scene, scale),
-    };
     let device = choice
-        .open(placement, priority)
+        .open(placement(scene, workbench_from_scene), priority)
         .map_err(Failure::bad_input)?;
     if let Some(sentence) = device.info().renders_no_torque() {
         tracing::warn!("{sentence}");

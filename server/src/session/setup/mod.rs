@@ -16,11 +16,13 @@ use std::time::Duration;
 use god_object::{Pose, Settings, World};
 pub(in crate::session) use refusals::unencodable;
 pub use refusals::{Refusal, refusals};
-use taut_bridge::{Device, DeviceLimits, ExternalWrenchSettings, SafetySettings};
+use taut_bridge::{
+    Device, DeviceLimits, ExternalWrenchSettings, InputChoice, Placement, SafetySettings,
+};
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
-use taut_scene::{BuiltMotion, FidelityPlan, Scene, WrenchSource};
+use taut_scene::{BuiltHand, BuiltMotion, FidelityPlan, Scene, WrenchSource};
 
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
@@ -46,6 +48,8 @@ pub struct SessionSetup {
     pub start: Pose,
     /// What moves the god-object.
     pub device: DeviceSource,
+    /// What it was opened by.
+    pub(crate) device_origin: DeviceOrigin,
     /// Limits and times of the force.
     pub safety: SafetySettings,
     /// A force from outside, where the workbench takes one.
@@ -95,6 +99,18 @@ pub struct ExternalSetup {
     pub settings: ExternalWrenchSettings,
     /// Where it comes from.
     pub source: WrenchSource,
+}
+
+/// All that a device of this process depends on when it is opened: where this is the same, so is the device.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct DeviceOrigin {
+    pub(crate) wanted: taut_scene::Device,
+    pub(crate) input: Option<InputChoice>,
+    /// The hand's intention in the scene.
+    pub(crate) hand: Option<BuiltHand>,
+    /// What the files hold that the workbench names for it.
+    pub(crate) files: Vec<Vec<u8>>,
+    pub(crate) placement: Placement,
 }
 
 /// What moves the god-object.

@@ -24,7 +24,7 @@ use crate::session::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
-use crate::session::setup::devices::{device, input};
+use crate::session::setup::devices::{device, input, origin as device_origin};
 use crate::session::setup::monitoring::monitor;
 use crate::session::setup::refusals::{
     borne, dynamics_of, few_motions, no_token_is_the_key, where_coupled,
@@ -145,6 +145,12 @@ pub fn session_setup(
             )?,
             None => device(&workbench.device, &built, &workbench_from_scene)?,
         },
+        device_origin: device_origin(
+            &workbench.device,
+            choice.as_ref(),
+            &built,
+            &workbench_from_scene,
+        ),
         motions: built.motions,
         settings: built.settings,
         start: built.start,

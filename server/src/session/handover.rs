@@ -1,0 +1,304 @@
+//! What one session leaves to the next of the same scene: where the bodies stand, and the device that moves the one in the hand.
+//!
+//! Friction, stiffness, a colour or the pose of something else is changed, and the body stays where it is: the next session begins there and not at
+//! the scene's start. The device that this process opened stays open; one behind a bridge stays by itself.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use god_object::nalgebra::Vector6;
+use god_object::{GodObject, Pose, StartError, World};
+use taut_bridge::{Device, DeviceFault, DeviceInfo, DeviceSample, Felt};
+use taut_scene::BuiltMotion;
+
+use crate::loops::god_object::Stand;
+use crate::session::setup::{DeviceOrigin, DeviceSource, SessionSetup};
+use crate::shared::clock::SessionClock;
+
+/// What the loops leave when they end.
+#[derive(Default)]
+pub(super) struct Left {
+    stand: Mutex<Option<Stand>>,
+    device: Mutex<Option<Box<dyn Device>>>,
+}
+
+/// What of a session its next one is compared with.
+#[derive(Debug)]
+pub(super) struct Before {
+    world: Arc<World>,
+    start: Pose,
+    motions: Vec<BuiltMotion>,
+    device: DeviceOrigin,
+}
+
+/// All that the next session gets.
+pub(crate) struct Handover {
+    before: Before,
+    stand: Option<Stand>,
+    device: Option<Box<dyn Device>>,
+    clock: SessionClock,
+}
+
+/// Where the body of a session began.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Beginning {
+    /// Where the scene says.
+    AtStart,
+    /// Where it was in the session before.
+    WhereItWas,
+    /// Where the scene says, since it cannot be where it was: the reason.
+    NotWhereItWas(String),
+}
+
+impl Beginning {
+    /// What a person is told of whom it surprises.
+    pub(crate) fn sentence(&self) -> Option<String> {
+        match self {
+            Self::AtStart | Self::WhereItWas => None,
+            Self::NotWhereItWas(why) => Some(format!(
+                "the body begins at the scene's start and not where it was: {why}"
+            )),
+        }
+    }
+}
+
+impl Left {
+    pub(super) fn leave_stand(&self, stand: Stand) {
+        *self.stand.lock().unwrap_or_else(PoisonError::into_inner) = Some(stand);
+    }
+
+    pub(super) fn leave_device(&self, device: Box<dyn Device>) {
+        *self.device.lock().unwrap_or_else(PoisonError::into_inner) = Some(device);
+    }
+
+    /// All of it, once the loops have ended.
+    pub(super) fn hand_over(&self, before: Before, clock: SessionClock) -> Handover {
+        let stand = &self.stand;
+        let device = &self.device;
+        Handover {
+            before,
+            stand: stand.lock().unwrap_or_else(PoisonError::into_inner).take(),
+            device: device.lock().unwrap_or_else(PoisonError::into_inner).take(),
+            clock,
+        }
+    }
+}
+
+impl Before {
+    pub(super) fn of(setup: &SessionSetup) -> Self {
+        Self {
+            world: setup.world.clone(),
+            start: setup.start,
+            motions: setup.motions.clone(),
+            device: setup.device_origin.clone(),
+        }
+    }
+
+    /// Whether the same body is held and begins at the same place, among obstacles that move alike.
+    fn is_of(&self, setup: &SessionSetup) -> bool {
+        let (before, now) = (&self.world.body, &setup.world.body);
+        self.start == setup.start
+            && before.reference_point == now.reference_point
+            && before.primitive == now.primitive
+            && before.mesh.vertices() == now.mesh.vertices()
+            && before.mesh.triangles() == now.mesh.triangles()
+            && self.motions == setup.motions
+    }
+}
+
+impl Handover {
+    /// Lets the bodies of `setup` begin where they were, if it is the same body and it can stand there; the time on the traces, and what came of it.
+    /// A recorded session begins at the scene's start: what is computed again begins there.
+    pub(super) fn place(&self, setup: &mut SessionSetup) -> (Duration, Beginning) {
+        let is_same = setup.recording.is_none() && self.before.is_of(setup);
+        let Some(stand) = self.stand.as_ref().filter(|_| is_same) else {
+            return (Duration::ZERO, Beginning::AtStart);
+        };
+        let world = Arc::make_mut(&mut setup.world);
+        let mut at_start = Vec::new();
+        for motion in &setup.motions {
+            if let (Some(obstacle), Some(was)) = (
+                world.obstacles.get_mut(motion.obstacle),
+                stand.obstacles.get(motion.obstacle),
+            ) {
+                at_start.push((motion.obstacle, std::mem::replace(&mut obstacle.pose, *was)));
+            }
+        }
+        match GodObject::check_start(world, &setup.settings, &stand.body) {
+            Ok(()) => {
+                setup.start = stand.body;
+                (stand.on_traces, Beginning::WhereItWas)
+            }
+            Err(error) => {
+                for (obstacle, pose) in at_start {
+                    world.obstacles[obstacle].pose = pose;
+                }
+                let why = match error {
+                    StartError::Penetration { obstacle } | StartError::TooNear { obstacle, .. } => {
+                        format!("there it would be in \"{obstacle}\" now")
+                    }
+                    other => other.to_string(),
+                };
+                (Duration::ZERO, Beginning::NotWhereItWas(why))
+            }
+        }
+    }
+
+    /// The device of before in the place of one that was opened as that was, on the clock of now.
+    pub(super) fn device(
+        self,
+        opened: DeviceSource,
+        origin: &DeviceOrigin,
+        clock: SessionClock,
+    ) -> DeviceSource {
+        match (opened, self.device) {
+            (DeviceSource::Local(_), Some(device)) if *origin == self.before.device => {
+                DeviceSource::Local(Box::new(KeptDevice {
+                    device,
+                    ahead: clock.since(&self.clock),
+                }))
+            }
+            (opened, _) => opened,
+        }
+    }
+}
+
+/// A device whose clock began with a session before.
+struct KeptDevice {
+    device: Box<dyn Device>,
+    /// Its clock is so much ahead of the session's.
+    ahead: Duration,
+}
+
+impl Device for KeptDevice {
+    fn info(&self) -> &DeviceInfo {
+        self.device.info()
+    }
+
+    fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        let sample = self.device.read(now + self.ahead)?;
+        Ok(DeviceSample {
+            time: sample.time.saturating_sub(self.ahead),
+            ..sample
+        })
+    }
+
+    fn write(&mut self, now: Duration, wrench: &Vector6<f64>) {
+        self.device.write(now + self.ahead, wrench);
+    }
+
+    fn let_go(&mut self) -> bool {
+        self.device.let_go()
+    }
+
+    fn comes_from(&mut self, origin: Option<Duration>, obstacle_work: f64) {
+        let origin = origin.map(|origin| origin + self.ahead);
+        self.device.comes_from(origin, obstacle_work);
+    }
+
+    fn scale(&self) -> f64 {
+        self.device.scale()
+    }
+
+    fn felt(&self) -> Option<Felt> {
+        let felt = self.device.felt()?;
+        let set_made = felt.set_made.map(|made| made.saturating_sub(self.ahead));
+        Some(Felt { set_made, ..felt })
+    }
+
+    fn computing_time(&self) -> Option<Duration> {
+        self.device.computing_time()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use taut_bridge::DeviceLimits;
+
+    use super::*;
+
+    /// Ages of its samples and the longest time that it was told, ms.
+    struct Told {
+        info: DeviceInfo,
+        newest: Arc<AtomicU64>,
+    }
+
+    impl Device for Told {
+        fn info(&self) -> &DeviceInfo {
+            &self.info
+        }
+
+        fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+            let told = now.as_millis() as u64;
+            assert!(
+                self.newest.swap(told, Ordering::Relaxed) <= told,
+                "it ran back"
+            );
+            Ok(DeviceSample {
+                time: now - Duration::from_millis(2),
+                pose: Pose::identity(),
+                velocity: Vector6::zeros(),
+                buttons: 0,
+            })
+        }
+
+        fn write(&mut self, now: Duration, _wrench: &Vector6<f64>) {
+            let told = now.as_millis() as u64;
+            assert!(
+                self.newest.swap(told, Ordering::Relaxed) <= told,
+                "it ran back"
+            );
+        }
+
+        fn comes_from(&mut self, origin: Option<Duration>, _obstacle_work: f64) {
+            assert_eq!(origin, Some(Duration::from_millis(9_999)));
+        }
+    }
+
+    #[test]
+    fn the_clock_of_a_kept_device_never_runs_back() {
+        let newest = Arc::<AtomicU64>::default();
+        let told = Told {
+            info: DeviceInfo {
+                limits: DeviceLimits::UNLIMITED,
+                ..DeviceInfo::without_force("told")
+            },
+            newest: newest.clone(),
+        };
+        let mut device: Box<dyn Device> = Box::new(told);
+        let ms = Duration::from_millis;
+        device.write(ms(5_000), &Vector6::zeros());
+        // The first session began 10 s before the second, and that 10 s before the third.
+        for _ in 0..2 {
+            device = Box::new(KeptDevice {
+                device,
+                ahead: ms(5_000),
+            });
+        }
+        let sample = device.read(ms(7)).expect("a sample");
+        assert_eq!(sample.time, ms(5));
+        assert_eq!(newest.load(Ordering::Relaxed), 10_007);
+        let first = device.read(ms(8)).expect("a sample");
+        assert_eq!(first.time, ms(6));
+        device.write(ms(9), &Vector6::zeros());
+        assert_eq!(newest.load(Ordering::Relaxed), 10_009);
+        let young = device.read(ms(9)).expect("a sample");
+        assert!(young.time <= ms(9));
+    }
+
+    #[test]
+    fn what_a_force_comes_from_is_told_on_the_clock_of_the_device() {
+        let told = Told {
+            info: DeviceInfo::without_force("told"),
+            newest: Arc::default(),
+        };
+        let mut device = KeptDevice {
+            device: Box::new(told),
+            ahead: Duration::from_millis(9_990),
+        };
+        device.comes_from(Some(Duration::from_millis(9)), 0.0);
+        assert_eq!(device.info().name, "told");
+    }
+}
