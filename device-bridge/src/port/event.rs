@@ -192,6 +192,7 @@ impl EventKind {
                 | Self::Disarmed
                 | Self::DeadManReleased
                 | Self::DeviceBack
+                | Self::DeviceNotStarted // whoever is to join has not yet
                 | Self::PassivityActs // as it does in any contact, where it is on
                 // A body that slips off an edge lets go of its force at once; the limit makes a ramp of that, as it is there to do.
                 | Self::ForceSlewLimited
@@ -199,10 +200,10 @@ impl EventKind {
         )
     }
 
-    /// Whether it is a fault: of the device's samples, or of the computed wrench.
+    /// Whether it is a fault: of the device's samples once they come, or of the computed wrench.
     #[must_use]
     pub fn is_fault(self) -> bool {
-        let of_device = self as u8 >= Self::DeviceNotStarted as u8;
+        let of_device = self as u8 > Self::DeviceNotStarted as u8;
         (of_device && self != Self::DeviceBack) || self == Self::WrenchNotFinite
     }
 }
@@ -357,6 +358,9 @@ mod tests {
             EventKind::PassivityActs,
         ];
         assert!(!in_contact.into_iter().any(EventKind::is_warning));
+        // A server whose bridge joins later.
+        let waits = EventKind::DeviceNotStarted;
+        assert!(!waits.is_fault() && !waits.is_warning());
     }
 
     #[test]

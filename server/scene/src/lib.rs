@@ -42,8 +42,8 @@ pub use runner::{Onlooker, Runner, numbers_of_pose, pose_of_numbers};
 pub use scene::{
     BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec, EditedKey,
     GOD_OBJECT_NAME, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MassSpec,
-    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, SceneSource,
-    ScenerySpec, Shape, ShippedScene, View, shipped_scene_text,
+    MethodSpec, MotionSpec, ObstacleSpec, Prepared, ReferencePoint, SHIPPED_SCENES, Scene,
+    SceneSource, ScenerySpec, Shape, ShippedScene, Sources, View, shipped_scene_text,
 };
 pub use shell_word::shell_word;
 pub use simplify::{Simplified, simplify};

@@ -45,15 +45,18 @@ impl Session {
     }
 
     /// What the scene can be wrong in: what [`Session::start`] refuses before anything is opened.
-    pub(crate) fn begin(setup: &SessionSetup) -> Result<(GodObject, PenetrationChecker), Failure> {
+    pub(crate) fn begin(setup: &mut SessionSetup) -> Result<GodObject, Failure> {
         setup.content.check()?;
         let god_object = GodObject::new(setup.world.clone(), setup.settings, setup.start)?;
-        let checker = PenetrationChecker::new(&setup.world).ok_or_else(|| {
-            Failure::bad_input(
-                "a mesh of the scene cannot be checked for penetration: run `taut check` on it",
-            )
-        })?;
-        Ok((god_object, checker))
+        if setup.checker.is_none() {
+            let checker = PenetrationChecker::new(&setup.world).ok_or_else(|| {
+                Failure::bad_input(
+                    "a mesh of the scene cannot be checked for penetration: run `taut check` on it",
+                )
+            })?;
+            setup.checker = Some(checker);
+        }
+        Ok(god_object)
     }
 
     /// The same with what outlives the session. A wish for force of before does not count; one for no force does.
@@ -68,7 +71,7 @@ impl Session {
             Some(handover) => handover.place(&mut setup),
             None => (Duration::ZERO, Beginning::AtStart),
         };
-        let (god_object, checker) = Self::begin(&setup)?;
+        let god_object = Self::begin(&mut setup)?;
 
         // The network, whose clock is everybody's; the device may be behind it.
         let clock = SessionClock::start();
@@ -210,7 +213,9 @@ impl Session {
         let watch = session.fidelity.as_ref().map(|f| f.watch.clone());
         let god_object = loops.god_object.with_fidelity(watch);
         session.start_god_object(god_object, loops.coupling_waker, &setup.realtime)?;
-        session.start_checker(checker, loops.readers.checker)?;
+        if let Some(checker) = setup.checker.take() {
+            session.start_checker(checker, loops.readers.checker)?;
+        }
         session.start_broadcast(
             states,
             broadcaster,

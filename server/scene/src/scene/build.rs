@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::auto_fidelity::AutoFidelity;
 use super::built::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
 use super::load::{Scene, unusable};
+use super::prepared::{Prepared, Source, Sources};
 use super::spec::{MassSpec, ObstacleSpec, ReferencePoint, Shape, VisualSpec};
 use crate::appearance::Appearance;
 use crate::check::MeshFigures;
@@ -34,17 +35,27 @@ type Drawn<'s> = (&'s Shape, RawMesh, FileLook);
 impl Scene {
     /// Loads and generates the meshes and checks that the method can work on them. All faults are reported.
     pub fn build(&self) -> Result<BuiltScene, FileError> {
+        self.build_from(None)
+    }
+
+    /// The same with the meshes of a scene that was built before, as far as they are the same.
+    pub fn build_from(&self, before: Option<&Prepared>) -> Result<BuiltScene, FileError> {
         let mut problems = Vec::new();
         let spec = &self.spec;
-        let (mut body_mesh, body_look) = self.mesh(
-            &spec.god_object.shape,
-            &spec.god_object.shape_at,
-            &mut problems,
-        );
+        // What fidelity is chosen rests on the meshes as their files have them.
+        let before = before.filter(|_| spec.fidelity.is_none());
+        let mut sources = Vec::new();
+        let mut made = |shape, at, problems: &mut _| {
+            let (mesh, look, source) = self.mesh(shape, at, before, problems);
+            sources.push(source);
+            (mesh, look)
+        };
+        let held = &spec.god_object;
+        let (mut body_mesh, body_look) = made(&held.shape, &held.shape_at, &mut problems);
         let (mut obstacle_meshes, looks): (Vec<Option<Mesh>>, Vec<FileLook>) = spec
             .obstacles
             .iter()
-            .map(|o| self.mesh(&o.shape, &o.shape_at, &mut problems))
+            .map(|o| made(&o.shape, &o.shape_at, &mut problems))
             .unzip();
         let (scenery, scenery_lost) = self.built_scenery(&mut problems);
         let visuals = self.visuals(&mut problems);
@@ -67,7 +78,12 @@ impl Scene {
             }
             _ => None,
         };
-        let simplified = self.simplify_meshes(&mut body_mesh, &mut obstacle_meshes, auto.as_ref());
+        let simplified = self.simplify_meshes(
+            &mut body_mesh,
+            &mut obstacle_meshes,
+            auto.as_ref(),
+            &mut sources,
+        );
 
         let Some(mesh) = body_mesh else {
             return Err(self
@@ -112,6 +128,7 @@ impl Scene {
             scenery,
             lost_looks: lost_looks.into_iter().collect(),
             simplified,
+            sources: Sources::new(sources),
             view: spec.view,
             environment,
             size,
@@ -145,15 +162,22 @@ impl Scene {
         body: &mut Option<Mesh>,
         obstacles: &mut [Option<Mesh>],
         auto: Option<&AutoFidelity>,
+        sources: &mut [Source],
     ) -> Vec<Simplified> {
         let spec = &self.spec;
         let obstacles = spec.obstacles.iter().zip(obstacles);
         std::iter::once((&spec.god_object.shape, GOD_OBJECT_NAME, body))
             .chain(obstacles.map(|(o, mesh)| (&o.shape, o.name.as_str(), mesh)))
+            .zip(sources)
             .enumerate()
-            .filter_map(|(index, (shape, name, mesh))| {
-                let chosen = auto.and_then(|auto| auto.mesh_errors[index]);
-                simplify_as_asked(shape, chosen, name, mesh)
+            .filter_map(|(index, ((shape, name, mesh), source))| {
+                if source.simplified.is_none() {
+                    let chosen = auto.and_then(|auto| auto.mesh_errors[index]);
+                    source.simplified = simplify_as_asked(shape, chosen, name, mesh);
+                }
+                let report = source.simplified.clone()?;
+                let body = name.to_owned();
+                Some(Simplified { body, ..report })
             })
             .collect()
     }
@@ -279,15 +303,20 @@ impl Scene {
         &self,
         shape: &Shape,
         at: &At,
+        before: Option<&Prepared>,
         problems: &mut Vec<Problem>,
-    ) -> (Option<Mesh>, FileLook) {
+    ) -> (Option<Mesh>, FileLook, Source) {
         let (raw, look) = match self.raw_mesh(shape, at) {
             Ok(read) => read,
             Err(error) => {
                 problems.extend(error.into_problems());
-                return (None, FileLook::default());
+                return (None, FileLook::default(), Source::none());
             }
         };
+        let mut source = Source::of(&raw, shape.simplify());
+        if let Some(mesh) = before.and_then(|before| before.take_over(&mut source)) {
+            return (Some(mesh), look, source);
+        }
         let (count, name) = (raw.triangles.len(), shape.file().unwrap_or("a shape"));
         let _progress =
             Progress::on_triangles(count, format_args!("{name}: preparing {count} triangles"));
@@ -306,7 +335,7 @@ impl Scene {
                 }
             })
             .ok();
-        (mesh, look)
+        (mesh, look, source)
     }
 
     /// The surface of a shape of this scene, not yet checked for being closed, and how its file says that it looks.
@@ -427,16 +456,13 @@ fn simplify_as_asked(
     name: &str,
     mesh: &mut Option<Mesh>,
 ) -> Option<Simplified> {
-    let Shape::Mesh { simplify: set, .. } = shape else {
-        return None;
-    };
-    let max_error = set.or(chosen)?;
+    let is_file = matches!(shape, Shape::Mesh { .. });
+    let max_error = shape.simplify().or(chosen.filter(|_| is_file))?;
     let (coarser, report) = simplify(mesh.take()?, max_error, name);
     *mesh = Some(coarser);
     Some(report)
 }
 
-/// What the file of a shape says of its look and nobody sees.
 /// A body as it is drawn, and what is lost of the look of its file.
 fn drawn_body(
     (name, pose, said): (&str, Pose, &Appearance),

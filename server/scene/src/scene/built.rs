@@ -6,6 +6,7 @@ use nalgebra::{Point3, Vector3};
 use taut_plant::HandPreset;
 use taut_proto::Panorama;
 
+use super::prepared::Sources;
 use super::spec::View;
 use crate::appearance::Appearance;
 use crate::fidelity::FidelityPlan;
@@ -99,6 +100,8 @@ pub struct BuiltScene {
     pub lost_looks: Vec<String>,
     /// How meshes were simplified, for each shape that asks for it.
     pub simplified: Vec<Simplified>,
+    /// What the meshes were made of: for [`Scene::build_from`](super::Scene::build_from).
+    pub sources: Sources,
     /// How the scene stands on the workbench.
     pub view: View,
     /// The light around it; `None` is a studio.

@@ -10,6 +10,7 @@ mod parse;
 mod parse_look;
 mod parse_mesh_file;
 mod parse_shape;
+mod prepared;
 mod settings_tables;
 mod shipped;
 mod spec;
@@ -22,6 +23,7 @@ pub(crate) use load::unusable;
 pub use load::{Scene, SceneSource};
 pub(crate) use parse_mesh_file::LENGTH_UNITS;
 pub(crate) use parse_shape::pose_of;
+pub use prepared::{Prepared, Sources};
 pub use settings_tables::{CouplingSpec, LimitSpec, MethodSpec};
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{

@@ -90,6 +90,14 @@ impl Shape {
         }
     }
 
+    /// Within what its mesh is to be simplified, m, where the scene says so.
+    pub(super) fn simplify(&self) -> Option<f64> {
+        match self {
+            Self::Mesh { simplify, .. } => *simplify,
+            _ => None,
+        }
+    }
+
     /// The same in the hand, where a plane is its plate: a half-space cannot be held.
     pub(super) fn held(self) -> Self {
         match self {

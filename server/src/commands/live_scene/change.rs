@@ -49,7 +49,7 @@ impl Wanted {
         if keep {
             next.not_kept.clear();
         }
-        Session::begin(&next.setup)?;
+        Session::begin(&mut next.setup)?;
         Ok(Some(Change { next, what, keep }))
     }
 

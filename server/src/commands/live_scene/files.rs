@@ -12,7 +12,7 @@ use crate::shared::failure::Failure;
 /// Watches the workbench file and the files of its scene.
 pub(super) struct SceneWatch {
     files: FileWatch,
-    /// Text that says what the scene is made of, as far as it is in one: its own, and that of what it names.
+    /// Text that says what the scene is made of, as far as it is in one: its own, and that of what it names; and what is shown beside it.
     contents: Vec<Vec<u8>>,
     paths: Vec<PathBuf>,
 }
@@ -42,7 +42,7 @@ impl SceneWatch {
         watched.extend(named.cloned());
         Ok(Self {
             files: FileWatch::new(watched).and_while_there(of_meshes),
-            contents: contents(&workbench.scene, &paths),
+            contents: contents(workbench, &paths),
             paths,
         })
     }
@@ -88,13 +88,15 @@ impl SceneWatch {
     }
 }
 
-/// Name of the scene, and the bytes of its files.
-fn contents(scene: &str, paths: &[PathBuf]) -> Vec<Vec<u8>> {
+/// Name of the scene, the bytes of its files, and what is shown beside it.
+fn contents(workbench: &Workbench, paths: &[PathBuf]) -> Vec<Vec<u8>> {
     let files = paths
         .iter()
         .map(|path| std::fs::read(path).unwrap_or_default());
-    std::iter::once(scene.as_bytes().to_vec())
+    let shown = format!("{:?}", workbench.show).into_bytes();
+    std::iter::once(workbench.scene.as_bytes().to_vec())
         .chain(files)
+        .chain([shown])
         .collect()
 }
 
@@ -172,6 +174,20 @@ mod tests {
         assert!(none.is_none(), "a session of the old text");
         let next = followed(&mut watch, &loader, || ()).expect("the new one");
         assert!(next.in_file.contains("1500.0"), "{}", next.in_file);
+    }
+
+    #[test]
+    fn what_is_shown_beside_the_scene_is_followed_as_the_scene_is() {
+        let place = tempfile::tempdir().expect("a directory");
+        let (args, _) = followed_scene(place.path(), BALL_ON_FLOOR);
+        let config = args.config.clone();
+        let (loader, mut watch) = following(args);
+        let text = std::fs::read_to_string(&config).expect("a file");
+        let shown = text.replacen("contacts = false", "contacts = true", 1);
+        assert_ne!(shown, text);
+        std::fs::write(&config, shown).expect("written");
+        let next = followed(&mut watch, &loader, || ()).expect("another look");
+        assert!(next.setup.content.description.show.contacts);
     }
 
     #[test]

@@ -59,6 +59,7 @@ impl Loader {
     /// A session of this begins: what the next one is to have of it.
     pub(super) fn keep(&mut self, chosen: Option<Chosen>, setup: &SessionSetup) {
         self.chosen = chosen;
+        self.overrides.prepared = Some(setup.prepared.clone());
         let page = setup.operator.as_ref();
         self.token = page.map(|page| page.server.token.clone());
     }

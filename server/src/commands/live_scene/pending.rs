@@ -34,8 +34,8 @@ pub(super) fn make(wanted: Wanted) -> io::Result<JoinHandle<Result<Option<Change
 /// Reads the files.
 pub(super) fn load(loader: Loader) -> io::Result<JoinHandle<Result<Next, Failure>>> {
     on_own_thread(move || {
-        let next = loader.load()?;
-        Session::begin(&next.setup)?;
+        let mut next = loader.load()?;
+        Session::begin(&mut next.setup)?;
         Ok(next)
     })
 }

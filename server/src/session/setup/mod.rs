@@ -22,8 +22,9 @@ use taut_bridge::{
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
-use taut_scene::{BuiltHand, BuiltMotion, FidelityPlan, Scene, WrenchSource};
+use taut_scene::{BuiltHand, BuiltMotion, FidelityPlan, Prepared, Scene, WrenchSource};
 
+use crate::loops::checker::PenetrationChecker;
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
 use crate::session::head::HeadSource;
@@ -39,6 +40,10 @@ pub struct SessionSetup {
     pub warnings: Vec<String>,
     /// Bodies.
     pub world: Arc<World>,
+    /// Its meshes, for a scene that differs in something else.
+    pub(crate) prepared: Prepared,
+    /// Made when the session begins, or before.
+    pub(crate) checker: Option<PenetrationChecker>,
     /// How obstacles move; nothing for those that stand still. At most
     /// [`MAX_MOVING`](crate::shared::contact_snapshot::MAX_MOVING).
     pub motions: Vec<BuiltMotion>,

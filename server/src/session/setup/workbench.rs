@@ -13,8 +13,8 @@ use taut_bridge::{
 use taut_link::{AlsoKey, ClusterKey, MulticastOptions, read_key_file};
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
 use taut_scene::{
-    BuiltScene, Device, HeadTracking, RealTimeMode, Scene, TransportKind, Viewer, Workbench,
-    WrenchFrame,
+    BuiltScene, Device, HeadTracking, Prepared, RealTimeMode, Scene, TransportKind, Viewer,
+    Workbench, WrenchFrame,
 };
 
 use crate::loops::realtime::RealtimePolicy;
@@ -54,6 +54,8 @@ pub struct Overrides {
     pub scene: Option<String>,
     /// A scene that was changed since it was read, whatever is named.
     pub edited: Option<Scene>,
+    /// Meshes that are there already.
+    pub prepared: Option<Prepared>,
     /// Address of the control plane.
     pub quic: Option<SocketAddr>,
     /// Address of the state plane.
@@ -81,7 +83,7 @@ pub fn session_setup(
         (None, Some(named)) => Scene::named_or_file(named)?,
         (None, None) => workbench.load_scene()?,
     };
-    let built = scene.build()?;
+    let built = scene.build_from(overrides.prepared.as_ref())?;
     few_motions(&built)?;
     no_token_is_the_key(workbench, &key)?;
     let choice = driver(workbench, overrides)?;
@@ -131,30 +133,36 @@ pub fn session_setup(
         let at_bridge = choice.is_none() && workbench.device == Device::Remote;
         crate::session::setup::fidelity::apply(plan, &mut realtime, rate_is_set, at_bridge);
     }
+    let device_origin = device_origin(
+        &workbench.device,
+        choice.as_ref(),
+        &built,
+        &workbench_from_scene,
+    );
+    let device = match &choice {
+        Some(choice) => input(
+            choice,
+            &built,
+            &workbench_from_scene,
+            realtime.haptics_priority,
+        )?,
+        None => device(&workbench.device, &built, &workbench_from_scene)?,
+    };
+    let world = Arc::new(built.world);
+    let prepared = Prepared::new(world.clone(), built.sources);
     Ok(SessionSetup {
         scene,
+        prepared,
+        checker: None,
         warnings,
         fidelity,
         recording,
-        device: match &choice {
-            Some(choice) => input(
-                choice,
-                &built,
-                &workbench_from_scene,
-                realtime.haptics_priority,
-            )?,
-            None => device(&workbench.device, &built, &workbench_from_scene)?,
-        },
-        device_origin: device_origin(
-            &workbench.device,
-            choice.as_ref(),
-            &built,
-            &workbench_from_scene,
-        ),
+        device,
+        device_origin,
         motions: built.motions,
         settings: built.settings,
         start: built.start,
-        world: Arc::new(built.world),
+        world,
         safety,
         external: external(workbench, overrides, &workbench_from_scene)?,
         head: head(&workbench.viewer),
