@@ -5,8 +5,8 @@
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
 //!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`force::ForceSample`], [`force::PassedForce`],
 //!   [`wrench::WrenchCommand`], [`constraints::ConstraintPart`], [`barrier`], [`time`].
-//! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`], the light around them as
-//!   [`panorama::Panorama`].
+//! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`], the pictures on them as
+//!   [`texture::Texture`], the light around them as [`panorama::Panorama`].
 //!
 //! A datagram that is sealed opens once, and only with its bytes unchanged:
 //!
@@ -61,6 +61,8 @@ pub mod key;
 pub mod limits;
 pub mod membership;
 pub mod mesh_blob;
+mod mesh_looks;
+pub mod mesh_textures;
 pub mod multicast;
 mod octahedral;
 pub mod pace;
@@ -78,6 +80,7 @@ pub mod seal;
 pub mod state;
 pub mod stats;
 pub mod text;
+pub mod texture;
 pub mod time;
 pub mod version;
 pub mod waiting;
@@ -102,6 +105,7 @@ pub use header::{Header, Kind};
 pub use input::InputSample;
 pub use key::ClusterKey;
 pub use mesh_blob::{Finish, Look, Looks, MeshBlob, MeshHash};
+pub use mesh_textures::{TextureUse, Textures, Wrap};
 pub use panorama::Panorama;
 pub use pin::ServerPin;
 pub use pose::{PoseF32, PoseF64};
@@ -111,5 +115,6 @@ pub use scene::SceneDescription;
 pub use state::HotState;
 pub use stats::ClientStats;
 pub use text::{Printable, Untrusted};
+pub use texture::Texture;
 pub use version::{PROTOCOL_VERSION, VersionRange};
 pub use wrench::WrenchCommand;

@@ -3,7 +3,7 @@
 //! | offset | field     | bytes              | meaning                                      |
 //! |--------|-----------|--------------------|----------------------------------------------|
 //! | 0      | magic     | 4                  | "tmsh"                                       |
-//! | 4      | layout    | 1                  | bit 0: f64 vertices, bit 1: normals, bit 2: finish, bit 3: looks |
+//! | 4      | layout    | 1                  | bit 0: f64 vertices, bit 1: normals, bit 2: finish, bit 3: looks, bit 4: textures of looks |
 //! | 5      | reserved  | 3                  | 0                                            |
 //! | 8      | vertices  | 4                  | count n                                      |
 //! | 12     | triangles | 4                  | count m                                      |
@@ -12,8 +12,12 @@
 //! |        | normals   | n × 12 or 0        | unit, per vertex                             |
 //! |        | finish    | 8 or 0             | roughness, metallic: 0 to 1                  |
 //! |        | looks     | 4 + k × 20 + m or 0 | count k from 1 to 255; of each red, green, blue (linear), roughness, metallic: 0 to 1; of each triangle, which |
+//! |        | textures  | the rest, or 0     | see [`mesh_textures`](crate::mesh_textures)  |
 
-use crate::{DecodeError, EncodeError, codec::wire_struct};
+use crate::codec::wire_struct;
+pub use crate::mesh_looks::{Finish, Look, Looks, MAX_LOOKS};
+use crate::mesh_textures::Textures;
+use crate::{DecodeError, EncodeError};
 
 /// Most bytes of an encoded mesh: 4 million triangles.
 pub const MAX_MESH_BYTES: usize = 128 << 20;
@@ -24,10 +28,8 @@ const LAYOUT_F64: u8 = 1;
 const LAYOUT_NORMALS: u8 = 2;
 const LAYOUT_FINISH: u8 = 4;
 const LAYOUT_LOOKS: u8 = 8;
+const LAYOUT_TEXTURES: u8 = 16;
 const FINISH_BYTES: usize = 8;
-const LOOK_BYTES: usize = 20;
-/// Most looks of one mesh.
-pub const MAX_LOOKS: usize = 255;
 
 wire_struct! {
     /// BLAKE3 hash of an encoded mesh.
@@ -70,46 +72,6 @@ pub enum Positions {
     F64(Vec<[f64; 3]>),
 }
 
-/// How a surface reflects, in the terms of glTF 2.0's metallic-roughness material; its colour is the body's.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Finish {
-    /// 0 is a mirror, 1 is matt.
-    pub roughness: f32,
-    /// 0 is a dielectric (plastic, paint, wood), 1 a metal.
-    pub metallic: f32,
-}
-
-/// How some of a body's triangles look, in the same terms.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
-    /// Linear red, green and blue.
-    pub colour: [f32; 3],
-    /// How they reflect.
-    pub finish: Finish,
-}
-
-/// Looks of a mesh whose triangles do not all look alike.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Looks {
-    /// At most [`MAX_LOOKS`], and one at least.
-    pub list: Vec<Look>,
-    /// Place in the list, for each triangle.
-    pub of_triangles: Vec<u8>,
-}
-
-impl Look {
-    fn numbers(&self) -> [f32; 5] {
-        let [red, green, blue] = self.colour;
-        [
-            red,
-            green,
-            blue,
-            self.finish.roughness,
-            self.finish.metallic,
-        ]
-    }
-}
-
 /// A triangle mesh. Every index is below the number of vertices, every number finite: checked when made or decoded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshBlob {
@@ -118,6 +80,7 @@ pub struct MeshBlob {
     normals: Option<Vec<[f32; 3]>>,
     finish: Option<Finish>,
     looks: Option<Looks>,
+    textures: Option<Textures>,
 }
 
 impl Positions {
@@ -173,6 +136,7 @@ impl MeshBlob {
             normals,
             finish: None,
             looks: None,
+            textures: None,
         })
     }
 
@@ -191,22 +155,17 @@ impl MeshBlob {
 
     /// The same mesh with looks of its triangles, which count instead of the body's colour and finish; their numbers are 0 to 1.
     pub fn with_looks(mut self, looks: Looks) -> Result<MeshBlob, DecodeError> {
-        let count = looks.list.len();
-        let known = |place: &u8| usize::from(*place) < count;
-        if !(1..=MAX_LOOKS).contains(&count)
-            || looks.of_triangles.len() != self.triangles.len()
-            || !looks.of_triangles.iter().all(known)
-        {
-            return Err(DecodeError::Inconsistent { what: "mesh looks" });
-        }
-        let mut numbers = looks.list.iter().flat_map(Look::numbers);
-        if !numbers.all(|number| (0.0..=1.0).contains(&number)) {
-            return Err(DecodeError::OutOfRange {
-                number: "MeshBlob.looks",
-                range: "0 to 1",
-            });
-        }
+        looks.check(self.triangles.len())?;
         self.looks = Some(looks);
+        self.textures = None; // those of other looks
+        Ok(self)
+    }
+
+    /// The same mesh with textures of its looks, which it must have.
+    pub fn with_textures(mut self, textures: Textures) -> Result<MeshBlob, DecodeError> {
+        let looks = self.looks.as_ref().map_or(0, |looks| looks.list.len());
+        textures.check(looks, self.triangles.len())?;
+        self.textures = Some(textures);
         Ok(self)
     }
 
@@ -243,6 +202,11 @@ impl MeshBlob {
         self.looks.as_ref()
     }
 
+    /// Textures of its looks; `None` is plain colours.
+    pub fn textures(&self) -> Option<&Textures> {
+        self.textures.as_ref()
+    }
+
     /// The bytes that travel and are hashed. Fails above [`MAX_MESH_BYTES`].
     pub fn encode(&self) -> Result<Vec<u8>, EncodeError> {
         let vertices = self.positions.len();
@@ -261,17 +225,19 @@ impl MeshBlob {
             None => (0, 0),
         };
         let (looks, look_bytes) = match &self.looks {
-            Some(looks) => (
-                LAYOUT_LOOKS,
-                4 + LOOK_BYTES * looks.list.len() + looks.of_triangles.len(),
-            ),
+            Some(looks) => (LAYOUT_LOOKS, looks.encoded_len()),
+            None => (0, 0),
+        };
+        let (textures, texture_bytes) = match &self.textures {
+            Some(textures) => (LAYOUT_TEXTURES, textures.encoded_len()),
             None => (0, 0),
         };
         let len = PREFIX_BYTES
             + vertices * (position_bytes + normal_bytes)
             + self.triangles.len() * 12
             + finish_bytes
-            + look_bytes;
+            + look_bytes
+            + texture_bytes;
         if len > MAX_MESH_BYTES {
             return Err(EncodeError::TooLong {
                 what: "mesh",
@@ -281,7 +247,7 @@ impl MeshBlob {
         }
         let mut bytes = Vec::with_capacity(len);
         bytes.extend(BLOB_MAGIC);
-        bytes.extend([wide | normals | finish | looks, 0, 0, 0]);
+        bytes.extend([wide | normals | finish | looks | textures, 0, 0, 0]);
         bytes.extend((vertices as u32).to_le_bytes()); // far below 2^32: see the limit above
         bytes.extend((self.triangles.len() as u32).to_le_bytes());
         match &self.positions {
@@ -308,10 +274,10 @@ impl MeshBlob {
             .flat_map(|finish| [finish.roughness, finish.metallic])
             .for_each(|x| bytes.extend(x.to_le_bytes()));
         if let Some(looks) = &self.looks {
-            bytes.extend((looks.list.len() as u32).to_le_bytes()); // at most MAX_LOOKS
-            let numbers = looks.list.iter().flat_map(Look::numbers);
-            bytes.extend(numbers.flat_map(f32::to_le_bytes));
-            bytes.extend(&looks.of_triangles);
+            looks.write(&mut bytes);
+        }
+        if let Some(textures) = &self.textures {
+            textures.write(&mut bytes);
         }
         Ok(bytes)
     }
@@ -342,8 +308,10 @@ impl MeshBlob {
         if [m0, m1, m2, m3] != BLOB_MAGIC {
             return Err(DecodeError::WrongMagic);
         }
-        let known = LAYOUT_F64 | LAYOUT_NORMALS | LAYOUT_FINISH | LAYOUT_LOOKS;
-        if layout & !known != 0 || [r0, r1, r2] != [0; 3] {
+        let known = LAYOUT_F64 | LAYOUT_NORMALS | LAYOUT_FINISH | LAYOUT_LOOKS | LAYOUT_TEXTURES;
+        let has = |part: u8| layout & part != 0;
+        let unknown = layout & !known != 0 || has(LAYOUT_TEXTURES) && !has(LAYOUT_LOOKS);
+        if unknown || [r0, r1, r2] != [0; 3] {
             return Err(DecodeError::UnknownTag {
                 what: "mesh layout",
                 tag: layout,
@@ -351,9 +319,9 @@ impl MeshBlob {
         }
         let vertices = u64::from(u32::from_le_bytes([v0, v1, v2, v3]));
         let triangles = u64::from(u32::from_le_bytes([t0, t1, t2, t3]));
-        let wide = layout & LAYOUT_F64 != 0;
-        let with_normals = layout & LAYOUT_NORMALS != 0;
-        let with_finish = layout & LAYOUT_FINISH != 0;
+        let wide = has(LAYOUT_F64);
+        let with_normals = has(LAYOUT_NORMALS);
+        let with_finish = has(LAYOUT_FINISH);
 
         // The counts must account for every byte before anything is read.
         let position_len = vertices * if wide { 24 } else { 12 };
@@ -363,9 +331,7 @@ impl MeshBlob {
         let before_looks = position_len + triangle_len + normal_len + finish_len;
         let looks_start = usize::try_from(before_looks).unwrap_or(usize::MAX);
         let (body, looks) = match body.split_at_checked(looks_start) {
-            Some((body, looks)) if (layout & LAYOUT_LOOKS != 0) != looks.is_empty() => {
-                (body, looks)
-            }
+            Some((body, looks)) if has(LAYOUT_LOOKS) != looks.is_empty() => (body, looks),
             _ => {
                 return Err(DecodeError::Inconsistent {
                     what: "mesh length",
@@ -391,39 +357,20 @@ impl MeshBlob {
                 metallic: f32::from_le_bytes([e, f, g, h]),
             })?;
         }
-        match looks {
-            [] => Ok(mesh),
-            looks => mesh.with_looks(looks_of(looks)?),
+        if looks.is_empty() {
+            return Ok(mesh);
+        }
+        let (looks, textures) = Looks::read(looks, mesh.triangles.len())?;
+        let count = looks.list.len();
+        let mesh = mesh.with_looks(looks)?;
+        match (has(LAYOUT_TEXTURES), textures) {
+            (false, []) => Ok(mesh),
+            (false, _) => Err(DecodeError::Inconsistent {
+                what: "mesh length",
+            }),
+            (true, textures) => mesh.with_textures(Textures::read(textures, count)?),
         }
     }
-}
-
-/// Looks out of their bytes; the places of the triangles are whatever follows the list.
-fn looks_of(bytes: &[u8]) -> Result<Looks, DecodeError> {
-    let Some((count, rest)) = bytes.split_first_chunk::<4>() else {
-        return Err(DecodeError::Truncated);
-    };
-    let count = u32::from_le_bytes(*count) as usize;
-    let list = LOOK_BYTES.checked_mul(count);
-    let Some((list, of_triangles)) = list.and_then(|length| rest.split_at_checked(length)) else {
-        return Err(DecodeError::Truncated);
-    };
-    let (numbers, _) = list.as_chunks::<4>();
-    let (looks, _) = numbers.as_chunks::<5>();
-    let look = |numbers: &[[u8; 4]; 5]| {
-        let [red, green, blue, roughness, metallic] = numbers.map(f32::from_le_bytes);
-        Look {
-            colour: [red, green, blue],
-            finish: Finish {
-                roughness,
-                metallic,
-            },
-        }
-    };
-    Ok(Looks {
-        list: looks.iter().map(look).collect(),
-        of_triangles: of_triangles.to_vec(),
-    })
 }
 
 /// Numbers of `N` bytes, three by three; `bytes` is a whole number of triples.

@@ -4,7 +4,8 @@ use crate::samples::*;
 use proptest::prelude::*;
 use taut_proto::{
     ClientStats, ControlMessage, DecodeError, EncodeError, Finish, HotState, Kind, Look, Looks,
-    MeshBlob, PROTOCOL_VERSION, Payload, Refusal, SceneDescription, Untrusted, VersionRange,
+    MeshBlob, MeshHash, PROTOCOL_VERSION, Payload, Refusal, SceneDescription, TextureUse, Textures,
+    Untrusted, VersionRange, Wrap,
     codec::{MAX_LIST, MAX_TEXT_BYTES, decode, encode_onto},
     control::{Bye, LENGTH_BYTES, MAX_FRAME_BYTES, RefusalCode},
     header::MAX_PAYLOAD_BYTES,
@@ -301,6 +302,94 @@ fn looks_that_are_not_of_the_mesh_are_refused() {
     let last = other.len() - 1;
     other[last] = 255;
     assert_eq!(MeshBlob::decode(&other), inconsistent);
+}
+
+fn textures() -> Textures {
+    let texture = |byte: u8, wrap| TextureUse {
+        texture: MeshHash { bytes: [byte; 32] },
+        wrap,
+    };
+    Textures {
+        list: vec![
+            texture(7, [Wrap::Repeat, Wrap::Clamp]),
+            texture(8, [Wrap::Mirror, Wrap::Repeat]),
+        ],
+        of_looks: vec![Some(1), None, Some(0)],
+        coordinates: vec![[[0.0, 1.0], [0.5, -2.5], [1e6, 0.25]]; 4],
+    }
+}
+
+/// With three looks.
+fn patched() -> MeshBlob {
+    let looks = Looks {
+        list: vec![look(1.0), look(0.5), look(0.25)],
+        of_triangles: vec![0, 1, 2, 0],
+    };
+    let mesh = tetrahedron().with_looks(looks);
+    mesh.unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_mesh_comes_back_with_its_textures_and_not_when_it_is_cut() {
+    for finish in [None, Some(FINISH)] {
+        let mesh = patched().with_textures(textures());
+        let mut mesh = mesh.unwrap_or_else(|error| panic!("{error}"));
+        if let Some(finish) = finish {
+            let finished = mesh.with_finish(finish);
+            mesh = finished.unwrap_or_else(|error| panic!("{error}"));
+        }
+        let bytes = mesh.encode().unwrap_or_else(|error| panic!("{error}"));
+        for length in 0..bytes.len() {
+            let cut = MeshBlob::decode(&bytes[..length]);
+            assert!(cut.is_err(), "cut to {length}");
+        }
+        for more in 1..30 {
+            let longer = [&bytes[..], &vec![0; more]].concat();
+            assert!(MeshBlob::decode(&longer).is_err(), "{more} more");
+        }
+        // Looks are known to end before the textures; without their bit these are too much.
+        let mut unnamed = bytes.clone();
+        unnamed[4] &= !16;
+        assert!(MeshBlob::decode(&unnamed).is_err());
+        let mut alone = bytes.clone();
+        alone[4] &= !8;
+        assert!(MeshBlob::decode(&alone).is_err(), "textures without looks");
+        assert_eq!(MeshBlob::decode(&bytes), Ok(mesh));
+    }
+}
+
+#[test]
+fn textures_that_are_not_of_the_mesh_are_refused() {
+    let refused = |change: &dyn Fn(&mut Textures)| {
+        let mut changed = textures();
+        change(&mut changed);
+        patched().with_textures(changed).is_err()
+    };
+    assert!(!refused(&|_| {}));
+    assert!(refused(&|t| t.list.clear()));
+    assert!(refused(&|t| t.list = vec![t.list[0]; 65]), "too many");
+    assert!(refused(&|t| t.of_looks[0] = Some(2)), "no third");
+    assert!(refused(&|t| t.of_looks.truncate(2)), "a look without");
+    assert!(refused(&|t| t.coordinates.truncate(3)));
+    for number in [f32::NAN, f32::INFINITY] {
+        assert!(refused(&|t| t.coordinates[3][2][1] = number), "{number}");
+    }
+    assert!(tetrahedron().with_textures(textures()).is_err(), "no looks");
+    // A way to go on that nobody knows, and a count beyond all bytes.
+    let mesh = patched().with_textures(textures());
+    let bytes = mesh.map(|mesh| mesh.encode().unwrap_or_default());
+    let bytes = bytes.unwrap_or_default();
+    let start = bytes.len() - (4 + 2 * 34 + 3 + 4 * 24);
+    for (at, with) in [
+        (start + 4 + 32, &[3][..]),
+        (start, &u32::MAX.to_le_bytes()),
+        (start, &[0; 4]),
+        (start + 4 + 2 * 34, &[2]),
+    ] {
+        let mut bent = bytes.clone();
+        bent[at..at + with.len()].copy_from_slice(with);
+        assert!(MeshBlob::decode(&bent).is_err(), "{with:?} at {at}");
+    }
 }
 
 const FINISH: Finish = Finish {

@@ -6,7 +6,7 @@
 
 use crate::samples::*;
 use taut_proto::{
-    Finish, Look, Looks, MeshBlob, Panorama,
+    Finish, Look, Looks, MeshBlob, Panorama, Texture, TextureUse, Textures, Wrap,
     header::MAX_DATAGRAM_BYTES,
     mesh_blob::{MeshHash, Positions},
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
@@ -66,6 +66,20 @@ fn made() -> Vec<(String, String)> {
     let patched = patched.unwrap_or_else(|error| panic!("{error}"));
     let blob = patched.encode().unwrap_or_else(|error| panic!("{error}"));
     lines.push(("mesh/triangle-with-looks".to_owned(), hex(&blob)));
+    let texture = Texture::new((2, 1), vec![[255, 0, 0, 255], [0, 0, 255, 128]]);
+    let texture = texture.unwrap_or_else(|error| panic!("{error}")).encode();
+    lines.push(("texture/two-texels".to_owned(), hex(&texture)));
+    let pictured = patched.with_textures(Textures {
+        list: vec![TextureUse {
+            texture: MeshHash::of(&texture),
+            wrap: [Wrap::Mirror, Wrap::Clamp],
+        }],
+        of_looks: vec![Some(0)],
+        coordinates: vec![[[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]],
+    });
+    let pictured = pictured.unwrap_or_else(|error| panic!("{error}"));
+    let blob = pictured.encode().unwrap_or_else(|error| panic!("{error}"));
+    lines.push(("mesh/triangle-with-textures".to_owned(), hex(&blob)));
     let panorama = Panorama::from_fn(|column, row| [column as f32, row as f32, 0.5]).encode();
     lines.push((
         "panorama/hash".to_owned(),
