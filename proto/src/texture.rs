@@ -101,27 +101,35 @@ impl Texture {
     /// The same at half the size each way, rounded down, but at least one texel: the mean light of what each texel covers, where it can be seen.
     #[must_use]
     pub fn halved(&self) -> Self {
-        let (width, height) = self.size();
-        let (narrow, low) = ((width / 2).max(1), (height / 2).max(1));
-        let covered =
-            |place: u32, of: u32, texels: u32| place * texels / of..(place + 1) * texels / of;
-        let mut texels = Vec::with_capacity(narrow as usize * low as usize);
-        for y in 0..low {
-            for x in 0..narrow {
-                let mut mean = Mean::default();
-                for row in covered(y, low, height) {
-                    for column in covered(x, narrow, width) {
-                        mean.add(self.texels[(row * width + column) as usize]);
-                    }
-                }
-                texels.push(mean.texel());
+        let ((width, _), texels) = halved(self.size(), &self.texels);
+        Self { width, texels }
+    }
+}
+
+/// [`Texture::halved`] of texels that may be more than a texture has.
+///
+/// # Panics
+/// If they are fewer than the sides say.
+pub fn halved((width, height): (u32, u32), texels: &[[u8; 4]]) -> ((u32, u32), Vec<[u8; 4]>) {
+    let (narrow, low) = ((width / 2).max(1), (height / 2).max(1));
+    let covered = |place: u32, of: u32, side: u32| {
+        let edge = |place: u32| (u64::from(place) * u64::from(side) / u64::from(of)) as usize;
+        edge(place)..edge(place + 1)
+    };
+    let mut half = Vec::with_capacity(narrow as usize * low as usize);
+    for y in 0..low {
+        for x in 0..narrow {
+            let mut mean = Mean::default();
+            for row in covered(y, low, height) {
+                let start = row * width as usize;
+                let columns = covered(x, narrow, width);
+                let covered = &texels[start + columns.start..start + columns.end];
+                covered.iter().for_each(|texel| mean.add(*texel));
             }
-        }
-        Self {
-            width: narrow,
-            texels,
+            half.push(mean.texel());
         }
     }
+    ((narrow, low), half)
 }
 
 impl std::fmt::Debug for Texture {

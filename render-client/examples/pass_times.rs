@@ -157,5 +157,6 @@ fn scattered(mesh: &TriangleMesh) -> TriangleMesh {
         vertices,
         triangles,
         looks: None,
+        textures: None,
     }
 }

@@ -33,6 +33,10 @@ fn vertex(
     @location(9) look_finish: vec4<f32>,
     instance: Instance,
 ) -> Fragment {
+    return placed(position, folded, look_colour, look_finish, instance);
+}
+
+fn placed(position: vec3<f32>, folded: vec2<f32>, look_colour: vec4<f32>, look_finish: vec4<f32>, instance: Instance) -> Fragment {
     let normal = unfolded(folded); // its length does not matter
     let model = mat4x4(instance.model_x, instance.model_y, instance.model_z, instance.model_w);
     let place = model * vec4(position, 1.0);

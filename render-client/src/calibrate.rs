@@ -1,5 +1,6 @@
 //! Calibration pictures of the screens of a node, without a server: as PNG files or in its windows.
 
+use std::collections::HashMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -57,7 +58,13 @@ impl Calibration {
         };
         let mesh = Arc::new(speck()?);
         let meshes = vec![mesh; 1 + workbench.obstacles.len()];
-        let mut stage = description::stage(workbench, found, &meshes, None, &overrides)?;
+        let mut stage = description::stage(
+            workbench,
+            found,
+            (&meshes, &HashMap::new()),
+            None,
+            &overrides,
+        )?;
         for screen in &mut stage.screens {
             let correction = screen.correction.take().unwrap_or_default();
             // An output lights its own part of the screen: where there is one for each eye, each has a picture of its own.

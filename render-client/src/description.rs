@@ -1,5 +1,6 @@
 //! From the server's scene description to the stage that this node draws.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -14,6 +15,7 @@ use crate::correction::Correction;
 use crate::environment::Environment;
 use crate::error::RenderError;
 use crate::stage::{Stage, StageBody, StageScreen, TriangleMesh};
+use crate::textures::{KnownTextures, MeshTextures};
 use crate::view::{ClipPlanes, Screen};
 
 /// Id of the god-object among the bodies; obstacles are numbered from 0.
@@ -86,11 +88,12 @@ fn check_numbers(description: &SceneDescription) -> Result<(), RenderError> {
     Ok(())
 }
 
-/// The stage of one node; `meshes[0]` is the god-object's, then one per obstacle. `panorama` is the light that the scene names.
+/// The stage of one node; `meshes[0]` is the god-object's, then one per obstacle, with the `textures` that they name.
+/// `panorama` is the light that the scene names.
 pub(crate) fn stage(
     description: &SceneDescription,
     node: &NodeDescription,
-    meshes: &[Arc<MeshBlob>],
+    (meshes, textures): (&[Arc<MeshBlob>], &KnownTextures),
     panorama: Option<&Panorama>,
     overrides: &Overrides,
 ) -> Result<Stage, RenderError> {
@@ -101,7 +104,13 @@ pub(crate) fn stage(
     };
     check_numbers(description)?;
     let origin = pose(&description.scene_origin, "the scene on the workbench")?;
-    let drawn: Vec<(TriangleMesh, Point3<f64>)> = meshes.iter().map(|blob| mesh_of(blob)).collect();
+    let mut made = HashMap::new();
+    let mut drawn: Vec<(TriangleMesh, Point3<f64>)> = Vec::with_capacity(meshes.len());
+    for blob in meshes {
+        let (mut mesh, origin) = mesh_of(blob);
+        mesh.textures = MeshTextures::of(blob, textures, &mut made)?;
+        drawn.push((mesh, origin));
+    }
     let body = |id, mesh: usize, described: &BodyDescription| -> Result<StageBody, RenderError> {
         let [red, green, blue, opacity] = described.colour;
         Ok(StageBody {
@@ -239,6 +248,7 @@ fn mesh_of(blob: &MeshBlob) -> (TriangleMesh, Point3<f64>) {
         vertices: positions.into_iter().map(near).collect(),
         triangles: blob.triangles().to_vec(),
         looks: blob.looks().cloned(),
+        textures: None,
     };
     (mesh, origin)
 }

@@ -10,6 +10,7 @@ use std::ops::Range;
 use std::sync::mpsc::{Receiver, channel};
 
 use meshopt::{SimplifyOptions, VertexDataAdapter};
+use nalgebra::Vector3;
 
 use crate::normals::Shaded;
 
@@ -22,6 +23,9 @@ const FEWEST_TRIANGLES: usize = 5_000;
 const MOST_KEPT: f64 = 0.75;
 /// No level is off by more than this share of the mesh's size: what would be drawn with it is a few pixels large.
 const MOST_ERROR: f32 = 0.01;
+/// Where a picture slips on a surface, as it does where fewer triangles carry it, levels are sought within this first, then within twice as much and so on
+/// up to [`MOST_ERROR`]: a slip counts as a place that is off as far.
+const LEAST_SLIP: f32 = MOST_ERROR / 32.0;
 /// A normal that is off by 1 counts as much as a place that is off by this share of the mesh's size: on a body of 500 pixels half of a pixel is as
 /// much as 6 degrees.
 const NORMAL_WEIGHT: f32 = 0.01;
@@ -67,14 +71,25 @@ impl Detail {
             indices: indices.clone(),
             levels: vec![Level::whole(shaded)],
         };
-        let flat: Vec<[[f32; 3]; 2]> = vertices.iter().map(|&(p, n, _)| [p, n]).collect();
-        let stride = size_of::<[[f32; 3]; 2]>();
+        let coordinates = &shaded.coordinates;
+        let is_textured = !coordinates.is_empty();
+        let mut flat: Vec<f32> = Vec::new();
+        for (place, (position, normal, _)) in vertices.iter().enumerate() {
+            flat.extend(position.iter().chain(normal));
+            flat.extend(coordinates.get(place).into_iter().flatten());
+        }
+        let stride = size_of::<f32>() * if is_textured { 8 } else { 6 };
         let Ok(places) = VertexDataAdapter::new(bytemuck::cast_slice(&flat), stride, 0) else {
             return all; // vertices of a whole number of bytes each are always taken
         };
-        let normals = bytemuck::cast_slice(&flat).get(3..).unwrap_or_default();
+        let attributes = flat.get(3..).unwrap_or_default();
         let size = meshopt::simplify_scale(&places);
-        let free = vec![false; flat.len()];
+        let mut weights = vec![NORMAL_WEIGHT; 3];
+        if is_textured {
+            weights.extend([length_of_texture(shaded) / size.max(f32::MIN_POSITIVE); 2]);
+        }
+        let free = vec![false; vertices.len()];
+        let mut most = if is_textured { LEAST_SLIP } else { MOST_ERROR };
         let mut fewer = indices.clone();
         let mut error = 0.0;
         while has_levels(fewer.len()) {
@@ -82,20 +97,27 @@ impl Detail {
             let next = meshopt::simplify_with_attributes_and_locks(
                 &fewer,
                 &places,
-                normals,
-                &[NORMAL_WEIGHT; 3],
+                attributes,
+                &weights,
                 stride,
                 &free,
                 fewer.len() / 6 * 3,
-                MOST_ERROR,
+                most,
                 SimplifyOptions::RegularizeLight,
                 Some(&mut further),
             );
             if next.len() as f64 > MOST_KEPT * fewer.len() as f64 {
-                break;
+                if most >= MOST_ERROR {
+                    break;
+                }
+                most *= 2.0;
+                continue;
+            }
+            if is_textured {
+                further = most; // what was found is of the places alone, and not of the picture on them
             }
             error += FARTHEST * further * size;
-            fewer = meshopt::optimize_vertex_cache(&next, flat.len());
+            fewer = meshopt::optimize_vertex_cache(&next, vertices.len());
             let first = all.indices.len() as u32;
             all.indices.extend(&fewer);
             all.levels.push(Level {
@@ -104,6 +126,27 @@ impl Detail {
             });
         }
         all
+    }
+}
+
+/// Length on the surface that a texture's side takes, in the mesh's unit: the root of the ratio of areas. 0 where none has one.
+fn length_of_texture(shaded: &Shaded) -> f32 {
+    let (mut surface, mut picture) = (0.0_f64, 0.0_f64);
+    for triangle in shaded.indices.chunks_exact(3) {
+        let corner = |i: usize| triangle[i] as usize;
+        let [a, b, c] = [0, 1, 2].map(|i| shaded.coordinates[corner(i)].map(f64::from));
+        let [p, q, r] =
+            [0, 1, 2].map(|i| Vector3::from(shaded.vertices[corner(i)].0).cast::<f64>());
+        let covered = ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs();
+        if covered > 0.0 {
+            surface += (q - p).cross(&(r - p)).norm();
+            picture += covered;
+        }
+    }
+    if picture > 0.0 {
+        (surface / picture).sqrt() as f32
+    } else {
+        0.0
     }
 }
 

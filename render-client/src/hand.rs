@@ -147,6 +147,7 @@ mod tests {
         Content {
             description: SceneDescription::of_body("alone", body),
             meshes: vec![mesh],
+            textures: Vec::new(),
             panorama: None,
         }
     }

@@ -37,6 +37,7 @@ pub mod statistics;
 pub mod stereo;
 mod studio;
 mod texture_limits;
+pub mod textures;
 pub mod timeline;
 pub mod view;
 mod window;

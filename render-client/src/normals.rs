@@ -7,11 +7,13 @@
 //! Source of the weighting: Thürmer and Wüthrich 1998, "Computing vertex normals from polygonal facets".
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 use taut_proto::Look;
 
 use crate::stage::TriangleMesh;
+use crate::textures::MeshTextures;
 
 /// Faces that meet at a larger angle than this, in degrees, have a sharp edge between them.
 /// A 72-gon's faces meet at 5 degrees, a 12-gon's at 30, those of a chamfer at 45.
@@ -26,12 +28,16 @@ pub struct Shaded {
     pub indices: Vec<u32>,
     /// How vertices look that do not look as the body does.
     pub looks: Vec<Look>,
+    /// Place of each vertex in the texture of its look; none where no look has one.
+    pub coordinates: Vec<[f32; 2]>,
+    /// Textures of the looks.
+    pub textures: Option<Arc<MeshTextures>>,
 }
 
 /// Of a vertex that looks as its body does.
 pub const NO_LOOK: u32 = u32::MAX;
 
-/// The mesh with a normal at every corner; vertices are doubled along creases and between looks only.
+/// The mesh with a normal at every corner; vertices are doubled along creases, between looks and along the seams of textures only.
 ///
 /// Triangles that name a vertex that is not there are left out.
 pub fn shade(mesh: &TriangleMesh) -> Shaded {
@@ -73,9 +79,24 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
             .iter()
             .flat_map(|looks| looks.list.clone())
             .collect(),
+        coordinates: Vec::new(),
+        textures: mesh.textures.clone(),
     };
-    for ((triangle, own), look) in triangles.iter().zip(&faces).zip(looks) {
-        for &vertex in triangle {
+    let laid = mesh.textures.as_ref().map(|textures| {
+        let placed = textures.coordinates.iter().zip(&mesh.triangles);
+        let known = placed.filter(|(_, triangle)| known(triangle));
+        (
+            textures,
+            known.map(|(corners, _)| *corners).collect::<Vec<_>>(),
+        )
+    });
+    for (number, ((triangle, own), look)) in triangles.iter().zip(&faces).zip(looks).enumerate() {
+        let corners = laid.as_ref().map(|(textures, corners)| {
+            let corners = corners.get(number).copied().unwrap_or_default();
+            textures.of_look(look).map_or([[0.0; 2]; 3], |_| corners)
+        });
+        for (corner, &vertex) in triangle.iter().enumerate() {
+            let laid = corners.map(|corners| corners[corner]);
             let place = welded[vertex as usize];
             let sum = around
                 .faces(place)
@@ -92,7 +113,8 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
             let mut index = newest[place as usize];
             let differs = |index: u32| {
                 let (_, other, of) = shaded.vertices[index as usize];
-                other != normal || of != look
+                let elsewhere = laid.is_some_and(|at| shaded.coordinates[index as usize] != at);
+                other != normal || of != look || elsewhere
             };
             while index != NONE && differs(index) {
                 index = before[index as usize];
@@ -101,6 +123,7 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
                 index = shaded.vertices.len() as u32;
                 let vertex = (mesh.vertices[place as usize], normal, look);
                 shaded.vertices.push(vertex);
+                shaded.coordinates.extend(laid);
                 before.push(std::mem::replace(&mut newest[place as usize], index));
             }
             shaded.indices.push(index);
@@ -117,14 +140,25 @@ impl Shaded {
             mut vertices,
             indices,
             looks,
+            mut coordinates,
+            textures,
         } = self;
         let mut indices = meshopt::optimize_vertex_cache(&indices, vertices.len());
-        let used = meshopt::optimize_vertex_fetch_in_place(&mut indices, &mut vertices);
-        vertices.truncate(used);
+        if coordinates.is_empty() {
+            let used = meshopt::optimize_vertex_fetch_in_place(&mut indices, &mut vertices);
+            vertices.truncate(used);
+        } else {
+            let mut both: Vec<_> = vertices.into_iter().zip(coordinates).collect();
+            let used = meshopt::optimize_vertex_fetch_in_place(&mut indices, &mut both);
+            both.truncate(used);
+            (vertices, coordinates) = both.into_iter().unzip();
+        }
         Self {
             vertices,
             indices,
             looks,
+            coordinates,
+            textures,
         }
     }
 }
@@ -226,6 +260,7 @@ mod tests {
                 .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
                 .collect(),
             looks: None,
+            textures: None,
         };
         for (position, normal, _) in &shade(&loose).vertices {
             assert!(Vector3::from(*position).dot(&Vector3::from(*normal)) > 0.99);
@@ -284,6 +319,7 @@ mod tests {
                 vertices,
                 triangles: vec![],
                 looks: None,
+                textures: None,
             };
             assert_eq!(shade(&mesh).in_drawing_order(), shade(&mesh));
         }
@@ -295,6 +331,7 @@ mod tests {
             vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             triangles: vec![[0, 1, 2], [0, 1, 9]],
             looks: None,
+            textures: None,
         };
         assert_eq!(shade(&mesh).indices.len(), 3);
     }

@@ -19,6 +19,7 @@ use crate::film::film;
 use crate::renderer::{Gpu, OffScreen, PictureTarget, Renderer};
 use crate::stage::{Bounds, Stage, StageBody};
 use crate::stereo::Picture;
+use crate::textures::KnownTextures;
 use crate::timeline::{Latched, State};
 use crate::view::{Eyes, Screen};
 
@@ -40,6 +41,8 @@ pub struct PreviewScene {
     pub name: String,
     /// Each body with its mesh; the god-object is the first. At least one.
     pub bodies: Vec<(BodyDescription, Arc<MeshBlob>)>,
+    /// The textures that the meshes name.
+    pub textures: KnownTextures,
     /// Places in `bodies` of those without an end, such as half-spaces: drawn as far as their mesh goes, and not brought into view.
     pub endless: Vec<usize>,
     /// The light around it; `None` is a studio.
@@ -169,7 +172,8 @@ fn stage_of(scene: &PreviewScene) -> Result<Stage, RenderError> {
     };
     let meshes: Vec<Arc<MeshBlob>> = scene.bodies.iter().map(|(_, mesh)| mesh.clone()).collect();
     let light = scene.environment.as_deref();
-    description::stage(&description, &node, &meshes, light, &Overrides::default())
+    let meshes = (&meshes[..], &scene.textures);
+    description::stage(&description, &node, meshes, light, &Overrides::default())
 }
 
 /// The bodies that are brought into view: those with an end; all that are seen if there is no other.

@@ -1,5 +1,6 @@
 //! This node's session with the server: joins, fetches the stage, takes states, reports; and joins again when the server was gone.
 
+use std::collections::hash_map::Entry;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -18,6 +19,7 @@ use crate::error::RenderError;
 use crate::monitor::Places;
 use crate::node_status::LinkHealth;
 use crate::stage::Stage;
+use crate::textures::{KnownTextures, check_texels};
 use crate::timeline::{Contact, Head, State, Timeline};
 
 /// Distance between two looks for a signal while joining.
@@ -293,6 +295,20 @@ async fn prepare(
     for body in std::iter::once(&described.god_object).chain(&described.obstacles) {
         meshes.push(link.mesh(body.mesh).await.map_err(lost)?);
     }
+    let mut textures = KnownTextures::new();
+    for mesh in &meshes {
+        let mut texels = 0;
+        for used in mesh.textures().iter().flat_map(|textures| &textures.list) {
+            let known = match textures.entry(used.texture) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(place) => {
+                    place.insert(Arc::new(link.texture(used.texture).await.map_err(lost)?))
+                }
+            };
+            texels += known.texels().len() as u64;
+            check_texels(texels)?;
+        }
+    }
     let panorama = match described.environment {
         Some(hash) => Some(link.panorama(hash).await.map_err(lost)?),
         None => None,
@@ -300,7 +316,13 @@ async fn prepare(
     // The meshes of a large scene are copied for longer than the network's thread may be busy.
     let built = tokio::task::spawn_blocking(move || {
         let node = description::find_node(&described, &node)?;
-        let stage = description::stage(&described, node, &meshes, panorama.as_ref(), &overrides)?;
+        let stage = description::stage(
+            &described,
+            node,
+            (&meshes, &textures),
+            panorama.as_ref(),
+            &overrides,
+        )?;
         let show = overrides.show;
         let mut show = show.unwrap_or(described.show);
         show.hud |= described.show.hud || overrides.hud;

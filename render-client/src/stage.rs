@@ -14,6 +14,7 @@ use crate::calibration::Chart;
 use crate::comfort::Comfort;
 use crate::correction::Correction;
 use crate::environment::Environment;
+use crate::textures::MeshTextures;
 use crate::view::{ClipPlanes, Screen};
 
 /// Everything that stays the same over a session.
@@ -90,6 +91,8 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
     /// How triangles look that do not look as the body does.
     pub looks: Option<Looks>,
+    /// Textures of these looks.
+    pub textures: Option<Arc<MeshTextures>>,
 }
 
 /// A sphere around something.

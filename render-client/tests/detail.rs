@@ -24,6 +24,7 @@ fn globe(rings: u32, place: impl Fn(f32, f32) -> [f32; 3]) -> TriangleMesh {
         vertices: Vec::new(),
         triangles: Vec::new(),
         looks: None,
+        textures: None,
     };
     for ring in 0..=rings {
         let latitude = PI * (ring as f32 / rings as f32 - 0.5);

@@ -107,6 +107,7 @@ pub fn content() -> Content {
     Content {
         description,
         meshes: meshes.to_vec(),
+        textures: Vec::new(),
         panorama: None,
     }
 }

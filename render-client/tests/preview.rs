@@ -10,6 +10,7 @@ use taut_proto::{Finish, Look, Looks, MeshBlob, MeshHash, PoseF64};
 use taut_render::preview::{Preview, PreviewScene};
 use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::TriangleMesh;
+use taut_render::textures::KnownTextures;
 
 const SIZE: (u32, u32) = (320, 240);
 const RED: [f32; 4] = [0.8, 0.02, 0.02, 1.0];
@@ -41,6 +42,7 @@ fn scene(bodies: Vec<(BodyDescription, Arc<MeshBlob>)>) -> PreviewScene {
     PreviewScene {
         name: "test".to_owned(),
         bodies,
+        textures: KnownTextures::new(),
         endless: Vec::new(),
         environment: None,
         upright: UnitQuaternion::identity(),

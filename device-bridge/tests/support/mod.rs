@@ -52,6 +52,7 @@ fn content() -> Content {
             },
         ),
         meshes: vec![mesh],
+        textures: Vec::new(),
         panorama: None,
     }
 }

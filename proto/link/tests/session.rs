@@ -4,7 +4,8 @@ use crate::support::*;
 use std::time::Duration;
 use taut_link::{ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport, serve};
 use taut_proto::{
-    ClientStats, MeshHash, Panorama, WrenchCommand,
+    ClientStats, Finish, Look, Looks, MeshHash, Panorama, Texture, TextureUse, Textures, Wrap,
+    WrenchCommand,
     control::{LogLevel, RefusalCode},
     stats::DrawnState,
 };
@@ -396,6 +397,52 @@ async fn the_light_around_the_scene_comes_by_its_hash_and_is_not_served_without(
     let mesh = client.description().god_object.mesh;
     assert!(matches!(
         client.panorama(mesh).await,
+        Err(LinkError::BadMesh { .. })
+    ));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn textures_come_by_their_hash_and_no_mesh_is_served_without_its_own() {
+    let texture = must(Texture::new((2, 1), vec![[255, 0, 0, 255], [0, 0, 255, 9]]));
+    let hash = MeshHash::of(&texture.encode());
+    let mut content = content();
+    let mesh = content.meshes.remove(0);
+    let triangles = mesh.triangles().len();
+    let looks = Looks {
+        list: vec![Look {
+            colour: [1.0; 3],
+            finish: Finish {
+                roughness: 0.5,
+                metallic: 0.0,
+            },
+        }],
+        of_triangles: vec![0; triangles],
+    };
+    let textures = Textures {
+        list: vec![TextureUse {
+            texture: hash,
+            wrap: [Wrap::Repeat, Wrap::Clamp],
+        }],
+        of_looks: vec![Some(0)],
+        coordinates: vec![[[0.0; 2]; 3]; triangles],
+    };
+    let mesh = must(must(mesh.with_looks(looks)).with_textures(textures));
+    content.description.god_object.mesh = MeshHash::of(&must(mesh.encode()));
+    content.meshes.push(mesh.clone());
+    match serve(ServerOptions::loopback(key('a')), content.clone()).await {
+        Err(LinkError::Content { reason }) => assert!(reason.contains("texture"), "{reason}"),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("served without its texture"),
+    }
+    content.textures.push(std::sync::Arc::new(texture.clone()));
+    let server = must(serve(ServerOptions::loopback(key('a')), content).await);
+    let client = client(&server, Role::Render, "left").await;
+    let named = client.description().god_object.mesh;
+    assert_eq!(*must(client.mesh(named).await), mesh);
+    assert_eq!(must(client.texture(hash).await), texture);
+    // A mesh is no texture.
+    assert!(matches!(
+        client.texture(named).await,
         Err(LinkError::BadMesh { .. })
     ));
 }

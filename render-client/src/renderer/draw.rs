@@ -22,6 +22,7 @@ use super::pipeline::{FrameLayout, Output};
 use super::pipelines::Pipelines;
 use super::resources::buffer;
 use super::shadow::ShadowMap;
+use super::textures::TextureStore;
 use super::warp::WarpPipeline;
 use super::{contacts, shapes};
 use crate::comfort::Comfort;
@@ -99,12 +100,15 @@ impl Renderer {
         };
         let layout = FrameLayout::new(device);
         let fades = stage.comfort.nearest_disparity.is_some();
-        let pipelines = Pipelines::new(device, &layout, output, fades);
+        let any_textured = stage.meshes.iter().any(|mesh| mesh.textures.is_some());
+        let mut textures = any_textured.then(|| TextureStore::new(gpu));
+        let texture = textures.as_ref().map(|store| &store.layout);
+        let pipelines = Pipelines::new(device, &layout, output, fades, texture);
         let marks = [shapes::sphere(1.0, 20), shapes::arrow(0.06, 0.25, 24)];
         let meshes = stage.meshes.iter().map(|mesh| &**mesh).chain(&marks);
         let shaded: Vec<Shaded> = meshes.map(ordered).collect();
-        let meshes = shaded.iter().map(|of| MeshBuffers::new(device, of));
-        let meshes: Vec<MeshBuffers> = meshes.collect();
+        let on_card = |of| MeshBuffers::new(gpu, of, textures.as_mut());
+        let meshes: Vec<MeshBuffers> = shaded.iter().map(on_card).collect();
         let mesh_bounds: Vec<Bounds> = stage.meshes.iter().map(|mesh| mesh.bounds()).collect();
 
         // Obstacles, god-object, ghost, dots, arrow.
@@ -314,8 +318,12 @@ impl Renderer {
 
         pass.set_pipeline(&self.pipelines.mesh);
         pass.set_vertex_buffer(1, self.instances.slice(..));
-        self.draw_batches(pass, &self.plan.casters, &per_metre);
-        self.draw_batches(pass, &self.plan.marks, &per_metre);
+        self.draw_batches(pass, &self.plan.casters, &per_metre, Bodies::Plain);
+        self.draw_batches(pass, &self.plan.marks, &per_metre, Bodies::All);
+        if let Some(textured) = &self.pipelines.textured {
+            pass.set_pipeline(&textured.mesh);
+            self.draw_batches(pass, &self.plan.casters, &per_metre, Bodies::Textured);
+        }
         pass.set_pipeline(&self.pipelines.floor);
         pass.draw(0..4, 0..1);
         pass.set_pipeline(&self.pipelines.background);
@@ -323,7 +331,7 @@ impl Renderer {
         self.draw_translucent(pass, middle, &per_metre);
         if let Some(ghost) = &self.plan.ghost {
             pass.set_pipeline(&self.pipelines.ghost);
-            self.draw_batches(pass, std::slice::from_ref(ghost), &per_metre);
+            self.draw_batches(pass, std::slice::from_ref(ghost), &per_metre, Bodies::All);
         }
     }
 
@@ -340,9 +348,15 @@ impl Renderer {
         let away = |batch: &Batch| (batch.bounds.center - middle).norm_squared();
         let mut order: Vec<&Batch> = self.plan.translucent.iter().collect();
         order.sort_by(|a, b| away(b).total_cmp(&away(a)));
-        pass.set_pipeline(&self.pipelines.translucent);
         for batch in order {
-            self.draw_batches(pass, std::slice::from_ref(batch), per_metre);
+            let textured = self.pipelines.textured.as_ref();
+            let textured = textured.filter(|_| self.meshes[batch.mesh].is_textured());
+            let (pipeline, bodies) = match textured {
+                Some(textured) => (&textured.translucent, Bodies::Textured),
+                None => (&self.pipelines.translucent, Bodies::Plain),
+            };
+            pass.set_pipeline(pipeline);
+            self.draw_batches(pass, std::slice::from_ref(batch), per_metre, bodies);
         }
     }
 
@@ -352,13 +366,31 @@ impl Renderer {
         pass: &mut wgpu::RenderPass<'_>,
         batches: &[Batch],
         per_metre: &dyn Fn(&Bounds) -> f64,
+        bodies: Bodies,
     ) {
-        for batch in batches.iter().filter(|batch| !batch.instances.is_empty()) {
+        let textured = bodies == Bodies::Textured;
+        let wanted = |batch: &&Batch| {
+            let is_one = bodies == Bodies::All || self.meshes[batch.mesh].is_textured() == textured;
+            is_one && !batch.instances.is_empty()
+        };
+        for batch in batches.iter().filter(wanted) {
             let error = self.unseen_pixels / (per_metre(&batch.bounds) * batch.scale);
-            let drawn = self.meshes[batch.mesh].draw(pass, batch.instances.clone(), error);
+            let mesh = &self.meshes[batch.mesh];
+            let drawn = mesh.draw(pass, batch.instances.clone(), error, textured);
             self.triangles.fetch_add(drawn, Ordering::Relaxed);
         }
     }
+}
+
+/// Which of some bodies a pipeline draws.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Bodies {
+    /// All, as if they had no textures.
+    All,
+    /// Those without.
+    Plain,
+    /// Those with textures.
+    Textured,
 }
 
 /// Lowest and highest corner of the god-object, body frame.

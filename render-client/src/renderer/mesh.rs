@@ -1,10 +1,15 @@
 //! Meshes on the graphics card, and their instances.
 
+use std::borrow::Cow;
+
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Matrix4;
 use taut_proto::{Finish, Look};
 
+use super::gpu::Gpu;
 use super::resources::filled;
+use super::textured::Textured;
+use super::textures::TextureStore;
 use crate::detail::{Detail, Level, coarsest};
 use crate::normals::Shaded;
 use crate::stage::{Bounds, StageBody};
@@ -62,6 +67,7 @@ pub(crate) struct MeshBuffers {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     levels: Vec<Level>,
+    textured: Option<Textured>,
 }
 
 /// Consecutive instances of one mesh.
@@ -94,7 +100,9 @@ impl Instance {
 }
 
 impl MeshBuffers {
-    pub(crate) fn new(device: &wgpu::Device, shaded: &Shaded) -> Self {
+    /// `textures` are those of all meshes, where any has some.
+    pub(crate) fn new(gpu: &Gpu, shaded: &Shaded, textures: Option<&mut TextureStore>) -> Self {
+        let device = &gpu.device;
         let vertex = |&(position, normal, look): &([f32; 3], [f32; 3], u32)| {
             let (colour, finish) = packed(shaded.looks.get(look as usize));
             Vertex {
@@ -108,37 +116,65 @@ impl MeshBuffers {
         if vertices.is_empty() {
             vertices.push(Vertex::zeroed()); // a buffer has at least one element
         }
+        let mut indices = Cow::Borrowed(&shaded.indices);
+        let levels = vec![Level::whole(shaded)];
+        let mut textured = Textured::of(gpu, shaded, textures);
+        if let Some(textured) = &mut textured {
+            textured.sort(indices.to_mut(), &levels);
+        }
         Self {
             vertices: filled(device, "vertices", &vertices, wgpu::BufferUsages::VERTEX),
-            indices: index_buffer(device, &shaded.indices),
-            levels: vec![Level::whole(shaded)],
+            indices: index_buffer(device, &indices),
+            levels,
+            textured,
         }
     }
 
+    /// Whether it has textures.
+    pub(crate) fn is_textured(&self) -> bool {
+        self.textured.is_some()
+    }
+
+    /// Whether something is seen through its textures.
+    pub(crate) fn is_see_through(&self) -> bool {
+        let textured = self.textured.as_ref();
+        textured.is_some_and(|textured| textured.is_see_through)
+    }
+
     /// Takes the levels of the same mesh.
-    pub(crate) fn refine(&mut self, device: &wgpu::Device, detail: Detail) {
+    pub(crate) fn refine(&mut self, device: &wgpu::Device, mut detail: Detail) {
+        if let Some(textured) = &mut self.textured {
+            textured.sort(&mut detail.indices, &detail.levels);
+        }
         self.indices = index_buffer(device, &detail.indices);
         self.levels = detail.levels;
     }
 
     /// Size on the graphics card, in bytes.
     pub(crate) fn bytes(&self) -> u64 {
-        self.vertices.size() + self.indices.size()
+        let textured = self.textured.as_ref();
+        let coordinates = textured.map_or(0, |textured| textured.coordinates.size());
+        self.vertices.size() + self.indices.size() + coordinates
     }
 
     /// Draws instances with the fewest triangles that are off by at most `error`, in the mesh's unit; pipeline, bind group and instance buffer
-    /// (slot 1) are set. How many triangles that were.
+    /// (slot 1) are set. How many triangles that were. `with_textures`: the pipeline is one of textured bodies, and so is the mesh.
     pub(crate) fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         instances: std::ops::Range<u32>,
         error: f64,
+        with_textures: bool,
     ) -> u64 {
-        let indices = &self.levels[coarsest(&self.levels, error)].indices;
+        let level = coarsest(&self.levels, error);
+        let indices = &self.levels[level].indices;
         let triangles = indices.len() * instances.len() / 3;
         pass.set_vertex_buffer(0, self.vertices.slice(..));
         pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(indices.clone(), 0, instances);
+        match self.textured.as_ref().filter(|_| with_textures) {
+            Some(textured) => textured.draw(pass, level, &instances),
+            None => pass.draw_indexed(indices.clone(), 0, instances),
+        }
         triangles as u64
     }
 }
@@ -176,6 +212,17 @@ const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 4] =
 const INSTANCE_ATTRIBUTES: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![
     2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Float32x4, 6 => Float32x4, 7 => Float32x4
 ];
+
+const COORDINATE_ATTRIBUTES: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![10 => Float32x2];
+
+/// Layout of the third vertex buffer of a textured mesh: places in its textures.
+pub(crate) fn coordinate_layout() -> Option<wgpu::VertexBufferLayout<'static>> {
+    Some(wgpu::VertexBufferLayout {
+        array_stride: size_of::<[f32; 2]>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &COORDINATE_ATTRIBUTES,
+    })
+}
 
 /// Layouts of the two vertex buffers: vertices, instances.
 pub(crate) fn buffer_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 2] {

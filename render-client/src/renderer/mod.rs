@@ -22,6 +22,8 @@ mod pipelines;
 mod resources;
 mod shadow;
 pub mod shapes;
+mod textured;
+mod textures;
 mod warp;
 
 pub use draw::Renderer;

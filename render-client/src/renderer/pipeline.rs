@@ -32,7 +32,10 @@ pub(crate) enum Layer {
 pub(crate) struct PipelineParts<'a> {
     pub(crate) label: &'a str,
     pub(crate) source: &'a str,
+    pub(crate) vertex: &'a str,
     pub(crate) fragment: &'a str,
+    /// Bindings of its own, beside those of the view.
+    pub(crate) own: Option<&'a wgpu::BindGroupLayout>,
     pub(crate) buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
     pub(crate) topology: wgpu::PrimitiveTopology,
     pub(crate) layer: Layer,
@@ -116,6 +119,15 @@ impl FrameLayout {
         (buffer, group)
     }
 
+    /// The pipeline layout of these bindings and others.
+    fn with(&self, device: &wgpu::Device, own: &wgpu::BindGroupLayout) -> wgpu::PipelineLayout {
+        device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("frame and own"),
+            bind_group_layouts: &[Some(&self.group), Some(own)],
+            immediate_size: 0,
+        })
+    }
+
     /// A pipeline of the main pass; `source` follows frame.wgsl.
     pub(crate) fn pipeline(
         &self,
@@ -131,14 +143,15 @@ impl FrameLayout {
             parts.source
         );
         let module = shader(device, parts.label, source);
+        let with_own = parts.own.map(|own| self.with(device, own));
         let opaque = parts.layer != Layer::Translucent;
         let background = parts.layer == Layer::Background;
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(parts.label),
-            layout: Some(&self.pipeline),
+            layout: Some(with_own.as_ref().unwrap_or(&self.pipeline)),
             vertex: wgpu::VertexState {
                 module: &module,
-                entry_point: Some("vertex"),
+                entry_point: Some(parts.vertex),
                 compilation_options: Default::default(),
                 buffers: parts.buffers,
             },

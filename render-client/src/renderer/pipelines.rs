@@ -1,6 +1,6 @@
 //! The pipelines of the main pass.
 
-use super::mesh::buffer_layouts;
+use super::mesh::{buffer_layouts, coordinate_layout};
 use super::pipeline::{FrameLayout, Layer, Output, PipelineParts};
 
 /// One for each kind of drawn thing.
@@ -17,20 +17,32 @@ pub(crate) struct Pipelines {
     pub(crate) translucent: wgpu::RenderPipeline,
     /// The device ghost.
     pub(crate) ghost: wgpu::RenderPipeline,
+    /// Bodies with textures, where there are any.
+    pub(crate) textured: Option<TexturedPipelines>,
+}
+
+/// The same with textures: `mesh` and `translucent`.
+#[derive(Debug)]
+pub(crate) struct TexturedPipelines {
+    pub(crate) mesh: wgpu::RenderPipeline,
+    pub(crate) translucent: wgpu::RenderPipeline,
 }
 
 impl Pipelines {
-    /// With `fades` opaque bodies that come too near fade away.
+    /// With `fades` opaque bodies that come too near fade away. `texture`: bindings of a texture, where bodies have some.
     pub(crate) fn new(
         device: &wgpu::Device,
         layout: &FrameLayout,
         output: Output,
         fades: bool,
+        texture: Option<&wgpu::BindGroupLayout>,
     ) -> Self {
         let mesh = PipelineParts {
             label: "mesh",
             source: include_str!("../../shaders/mesh.wgsl"),
+            vertex: "vertex",
             fragment: if fades { "fading" } else { "fragment" },
+            own: None,
             buffers: &buffer_layouts(),
             topology: wgpu::PrimitiveTopology::TriangleList,
             layer: Layer::Opaque,
@@ -66,7 +78,34 @@ impl Pipelines {
             ..background
         };
         let pipeline = |parts| layout.pipeline(device, output, parts);
+        let textured = texture.map(|texture| {
+            let [vertices, instances] = buffer_layouts();
+            let buffers = [vertices, instances, coordinate_layout()];
+            let mesh = PipelineParts {
+                label: "textured",
+                source: concat!(
+                    include_str!("../../shaders/mesh.wgsl"),
+                    include_str!("../../shaders/textured.wgsl")
+                ),
+                vertex: "pictured",
+                fragment: if fades { "textured_fading" } else { "textured" },
+                own: Some(texture),
+                buffers: &buffers,
+                ..mesh
+            };
+            let translucent = PipelineParts {
+                label: "textured translucent",
+                fragment: "textured_translucent",
+                layer: Layer::Translucent,
+                ..mesh
+            };
+            TexturedPipelines {
+                mesh: layout.pipeline(device, output, &mesh),
+                translucent: layout.pipeline(device, output, &translucent),
+            }
+        });
         Self {
+            textured,
             background: pipeline(&background),
             floor: pipeline(&floor),
             mesh: pipeline(&mesh),

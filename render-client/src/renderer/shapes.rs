@@ -60,6 +60,7 @@ pub fn cuboid(half_extents: [f32; 3]) -> TriangleMesh {
             .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
             .collect(),
         looks: None,
+        textures: None,
     }
 }
 
@@ -96,6 +97,7 @@ fn revolve(profile: &[[f32; 2]], facets: u32) -> TriangleMesh {
         vertices,
         triangles,
         looks: None,
+        textures: None,
     }
 }
 

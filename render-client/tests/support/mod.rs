@@ -108,6 +108,7 @@ pub(crate) fn box_with_hole(half: f32, radius: f32, facets: u32) -> TriangleMesh
         vertices,
         triangles,
         looks: None,
+        textures: None,
     }
 }
 

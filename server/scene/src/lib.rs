@@ -14,6 +14,7 @@ mod finished_file;
 mod height_map_file;
 mod import;
 mod mesh_file;
+mod picture;
 mod problem;
 mod progress;
 mod runner;
@@ -36,7 +37,10 @@ pub use import::{
     Finding, ImportReport, ImportRequest, LengthUnit, MAX_HOLE_EDGES, PartReport, UpAxis, import,
     import_unless,
 };
-pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply};
+pub use mesh_file::{
+    BodyTexture, BodyTextures, RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply,
+};
+pub use picture::read_picture;
 pub use problem::{FileError, Problem};
 pub use runner::{Onlooker, Runner, numbers_of_pose, pose_of_numbers};
 pub use scene::{

@@ -12,7 +12,7 @@ use taut_render::renderer::{Gpu, GpuChoice};
 use taut_scene::{BuiltScene, FinishedFile, Scene};
 
 use crate::cli::{PREVIEW_SIZE, PreviewArgs};
-use crate::session::setup::content::bodies;
+use crate::session::setup::content::{bodies, textures};
 use crate::shared::failure::{EXIT_BAD_INPUT, Failure};
 
 /// Pictures of a film that does not say how many: 10 degrees from one to the next.
@@ -111,6 +111,7 @@ fn described(built: &BuiltScene) -> Result<PreviewScene, Failure> {
     Ok(PreviewScene {
         name: built.name.clone(),
         bodies: bodies.collect::<Result<_, _>>()?,
+        textures: textures(built),
         endless: endless.collect(),
         environment: built.environment.clone().map(Arc::new),
         upright: built.view.rotation.unwrap_or_else(UnitQuaternion::identity),

@@ -31,7 +31,7 @@ pub struct Decoder {
 pub const FIXED_MEMORY: usize = 4 << 20;
 
 /// All of them.
-pub const DECODERS: [Decoder; 31] = [
+pub const DECODERS: [Decoder; 33] = [
     decoder("datagram", wire::datagram, wire::datagram_seeds, 1),
     decoder("payload", wire::payload, wire::payload_seeds, 1),
     decoder("opener", wire::opener, wire::datagram_seeds, 1),
@@ -104,6 +104,7 @@ pub const DECODERS: [Decoder; 31] = [
         screens::environment_hdr_seeds,
         1024,
     ),
+    decoder("texture", wire::texture, wire::texture_seeds, 4),
     decoder("panorama", wire::panorama, wire::panorama_seeds, 2),
     decoder("scene_edit", files::scene_edit, files::scene_edit_seeds, 64),
     decoder("join_key", files::join_key, files::join_key_seeds, 1),

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use taut_proto::{
     Assembler, ConstraintPart, ControlMessage, Header, Kind, MeshBlob, PROTOCOL_VERSION, Panorama,
-    Payload,
+    Payload, Texture,
     control::{LENGTH_BYTES, MAX_FRAME_BYTES},
     header::{HEADER_BYTES, MAX_PAYLOAD_BYTES, TAG_BYTES},
 };
@@ -143,6 +143,19 @@ pub(crate) fn panorama(bytes: &[u8]) {
             assert!(light.iter().all(|part| part.is_finite() && *part >= 0.0));
         }
     }
+}
+
+/// A picture on surfaces as it travels: what is read is written as the same bytes, and can be made smaller.
+pub(crate) fn texture(bytes: &[u8]) {
+    if let Ok(texture) = Texture::decode(bytes) {
+        assert_eq!(texture.encode(), bytes);
+        let ((width, height), half) = (texture.size(), texture.halved().size());
+        assert_eq!(half, ((width / 2).max(1), (height / 2).max(1)));
+    }
+}
+
+pub(crate) fn texture_seeds() -> Vec<Vec<u8>> {
+    golden("texture/")
 }
 
 pub(crate) fn panorama_seeds() -> Vec<Vec<u8>> {

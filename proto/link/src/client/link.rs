@@ -14,7 +14,7 @@ use std::{
 };
 use taut_proto::{
     ClientStats, ConstraintSet, CouplingOffer, ForceSample, HeadSample, InputSample, MeshBlob,
-    MeshHash, Panorama, PassedForce, Payload, SceneDescription, SessionTime,
+    MeshHash, Panorama, PassedForce, Payload, SceneDescription, SessionTime, Texture,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
     state::EventRecord,
 };
@@ -126,6 +126,16 @@ impl ClientLink {
     pub async fn mesh(&self, hash: MeshHash) -> Result<Arc<MeshBlob>, LinkError> {
         self.meshes
             .get(&self.hot.connection, self.hot.version, &self.server, hash)
+            .await
+    }
+
+    /// The texture of `hash`, which a mesh names, as [`Self::mesh`]. It is not kept in memory.
+    ///
+    /// # Errors
+    /// The server does not have it, or is gone.
+    pub async fn texture(&self, hash: MeshHash) -> Result<Texture, LinkError> {
+        self.meshes
+            .texture(&self.hot.connection, self.hot.version, &self.server, hash)
             .await
     }
 

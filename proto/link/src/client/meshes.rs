@@ -1,4 +1,4 @@
-//! Meshes and panoramas by hash: from memory, from the cache on disk, or from the server on a stream of their own; checked against their hash, and kept
+//! Meshes, textures and panoramas by hash: from memory, from the cache on disk, or from the server on a stream of their own; checked against their hash, and kept
 //! for the next who asks, in this session or in a later one.
 
 use super::{inbound::lock, mesh_cache::MeshCache};
@@ -14,7 +14,7 @@ use std::{
 };
 use taut_cache::Cached;
 use taut_proto::{
-    DecodeError, MeshBlob, MeshHash, Panorama, SceneDescription, VersionRange,
+    DecodeError, MeshBlob, MeshHash, Panorama, SceneDescription, Texture, VersionRange,
     control::{ControlMessage, MeshHeader, MeshRequest},
     mesh_blob::MAX_MESH_BYTES,
 };
@@ -80,6 +80,18 @@ impl Meshes {
         hash: MeshHash,
     ) -> Result<Panorama, LinkError> {
         self.load(connection, version, server, hash, Panorama::decode)
+            .await
+    }
+
+    /// The texture of `hash`, from the cache on disk or from the server.
+    pub(crate) async fn texture(
+        &self,
+        connection: &Connection,
+        version: u8,
+        server: &str,
+        hash: MeshHash,
+    ) -> Result<Texture, LinkError> {
+        self.load(connection, version, server, hash, Texture::decode)
             .await
     }
 

@@ -1,9 +1,9 @@
-//! What clients fetch at join: the scene description, and meshes and light by hash.
+//! What clients fetch at join: the scene description, and meshes, textures and light by hash.
 
 use crate::LinkError;
 use std::{collections::HashMap, sync::Arc};
 use taut_proto::{
-    CouplingOffer, MeshBlob, MeshHash, Panorama, SceneDescription, control::ControlMessage,
+    CouplingOffer, MeshBlob, MeshHash, Panorama, SceneDescription, Texture, control::ControlMessage,
 };
 
 /// What clients fetch at join.
@@ -13,6 +13,8 @@ pub struct Content {
     pub description: SceneDescription,
     /// Every mesh that the description names.
     pub meshes: Vec<MeshBlob>,
+    /// Every texture that a mesh names.
+    pub textures: Vec<Arc<Texture>>,
     /// The light that the description names, if it names any.
     pub panorama: Option<Panorama>,
 }
@@ -23,7 +25,7 @@ pub(crate) struct EncodedContent {
     pub(crate) scene: Vec<u8>,
     /// The framed message about coupling, for the device bridge.
     pub(crate) coupling: Vec<u8>,
-    /// Meshes, and the panorama.
+    /// Meshes, textures, and the panorama.
     pub(crate) blobs: HashMap<MeshHash, Arc<[u8]>>,
     /// Names of the workbench's render nodes.
     pub(crate) nodes: Vec<String>,
@@ -48,6 +50,19 @@ impl Content {
         for mesh in &self.meshes {
             let bytes = mesh.encode().map_err(|error| refuse(error.to_string()))?;
             blobs.insert(MeshHash::of(&bytes), Arc::from(bytes));
+        }
+        for texture in &self.textures {
+            let bytes = texture.encode();
+            blobs.insert(MeshHash::of(&bytes), Arc::from(bytes));
+        }
+        let textures = self.meshes.iter().filter_map(MeshBlob::textures);
+        for one in textures.flat_map(|textures| &textures.list) {
+            if !blobs.contains_key(&one.texture) {
+                return Err(refuse(format!(
+                    "a mesh names texture {}, which is not among its textures; add it",
+                    one.texture
+                )));
+            }
         }
         if let Some(panorama) = &self.panorama {
             let bytes = panorama.encode();

@@ -89,6 +89,7 @@ pub fn content() -> Content {
     Content {
         description,
         meshes,
+        textures: Vec::new(),
         panorama: None,
     }
 }

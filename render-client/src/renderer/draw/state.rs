@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 use taut_proto::scene::Show;
 
-use super::{Plan, Renderer, Shadowed};
+use super::{Bodies, Plan, Renderer, Shadowed};
 use crate::renderer::frame::KeyLight;
 use crate::renderer::mesh::{Batch, Instance};
 use crate::renderer::shadow::ShadowMap;
@@ -21,9 +21,12 @@ impl Renderer {
         let mut bounds = self.bounds(stage, &stage.god_object, &state.god_object);
         let radius = bounds.radius;
         let scale = stage.workbench_from_scene.scaling();
+        let meshes = &self.meshes;
+        let is_opaque =
+            |body: &StageBody| body.opacity >= 1.0 && !meshes[body.mesh].is_see_through();
         let mut add = |body: &StageBody, instance, own| {
             let batch = list.batch(body.mesh, [instance], own, body.scale * scale);
-            if body.opacity >= 1.0 {
+            if is_opaque(body) {
                 casters.push(batch);
             } else if body.opacity > 0.0 {
                 translucent.push(batch);
@@ -31,7 +34,7 @@ impl Renderer {
         };
         let god_object = god_object::instance(stage, &state.god_object);
         add(&stage.god_object, god_object, bounds);
-        let moving = usize::from(stage.god_object.opacity >= 1.0);
+        let moving = usize::from(is_opaque(&stage.god_object));
         let mut all = bounds;
         let seen = stage.obstacles.iter().enumerate();
         for (place, body) in seen.filter(|(_, body)| body.opacity > 0.0) {
@@ -100,13 +103,13 @@ impl Renderer {
         if !stands {
             let mut pass = self.shadow.begin_standing(gpu, &mut encoder);
             pass.set_vertex_buffer(1, self.instances.slice(..));
-            self.draw_batches(&mut pass, standing, &per_metre);
+            self.draw_batches(&mut pass, standing, &per_metre, Bodies::All);
             self.shadow_passes += 1;
         }
         {
             let mut pass = self.shadow.begin_moving(gpu, &mut encoder);
             pass.set_vertex_buffer(1, self.instances.slice(..));
-            self.draw_batches(&mut pass, moving, &per_metre);
+            self.draw_batches(&mut pass, moving, &per_metre, Bodies::All);
         }
         let (light, floor) = (&self.plan.light, &self.floor);
         self.occlusion.draw(gpu, &mut encoder, light, floor);

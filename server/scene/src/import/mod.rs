@@ -121,8 +121,8 @@ pub fn import_unless(
     for ((report, mesh), visual) in parts.into_iter().zip(visuals) {
         go_on()?;
         folder.write(&report.mesh_file, &write_ply(&mesh))?;
-        for (name, text) in visual.iter().flat_map(Visual::files) {
-            folder.write(&name, text.as_bytes())?;
+        for (name, bytes) in visual.iter().flat_map(Visual::files) {
+            folder.write(&name, &bytes)?;
         }
         reports.push(report);
     }

@@ -1,11 +1,14 @@
-//! What is drawn of a part whose triangles do not all look alike: the surface of its file, as it was, beside the one that is felt.
+//! What is drawn of a part whose triangles do not all look alike, or have pictures on them: the surface of its file, as it was, beside the one that is felt.
 
+use std::collections::HashMap;
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
+use taut_proto::Wrap;
 
 use crate::appearance::{Appearance, encoded};
-use crate::mesh_file::{FileLook, RawMesh};
+use crate::mesh_file::{BodyTexture, BodyTextures, FileLook, RawMesh};
 
 /// A surface with looks.
 #[derive(Clone, Debug)]
@@ -13,6 +16,8 @@ pub(super) struct Visual {
     mesh: RawMesh,
     /// Lengths of runs of its triangles, with how each looks.
     parts: Vec<(Appearance, usize)>,
+    /// Textures of these.
+    textures: Option<Arc<BodyTextures>>,
     /// Name of its files, without an ending.
     name: String,
 }
@@ -32,6 +37,7 @@ impl Visual {
         (!parts.is_empty()).then(|| Self {
             mesh: placed(mesh),
             parts,
+            textures: look.textures.clone(),
             name: format!("{stem}-visual"),
         })
     }
@@ -47,30 +53,103 @@ impl Visual {
         format!("{}.obj", self.name)
     }
 
-    /// Its files, by name: surface and materials.
-    pub(super) fn files(&self) -> [(String, String); 2] {
+    /// Its files, by name: surface, materials and pictures.
+    pub(super) fn files(&self) -> Vec<(String, Vec<u8>)> {
         let mut materials = String::new();
-        let mut looks: Vec<Appearance> = Vec::new();
+        let mut looks: Vec<(Appearance, Option<usize>)> = Vec::new();
         let library = format!("{}.mtl", self.name);
         let mut surface = format!("mtllib {library}\n");
         // Writing to a String cannot fail.
         for vertex in &self.mesh.vertices {
             let _ = writeln!(surface, "v {:?} {:?} {:?}", vertex.x, vertex.y, vertex.z);
         }
+        let (mut places, mut coordinates) = (HashMap::new(), self.corners());
         let mut triangles = self.mesh.triangles.iter();
-        for (look, count) in &self.parts {
-            let known = looks.iter().position(|known| known == look);
+        for (part, (look, count)) in self.parts.iter().enumerate() {
+            let texture = self.textures.as_ref();
+            let texture = texture.and_then(|all| Some((all, (*all.of_looks.get(part)?)?)));
+            let look = (*look, texture.map(|(_, texture)| texture));
+            let known = looks.iter().position(|known| *known == look);
             let number = known.unwrap_or_else(|| {
-                looks.push(*look);
-                write_material(&mut materials, looks.len() - 1, look);
+                looks.push(look);
+                write_material(&mut materials, looks.len() - 1, &look.0);
+                if let Some((all, texture)) = texture {
+                    let picture = self.picture(texture, &all.list);
+                    write_map(&mut materials, &picture, &all.list[texture]);
+                }
                 looks.len() - 1
             });
             let _ = writeln!(surface, "usemtl look-{number}");
-            for [a, b, c] in triangles.by_ref().take(*count) {
-                let _ = writeln!(surface, "f {} {} {}", a + 1, b + 1, c + 1);
+            for triangle in triangles.by_ref().take(*count) {
+                let placed = coordinates.next().filter(|_| texture.is_some());
+                let Some(placed) = placed else {
+                    let [a, b, c] = triangle.map(|vertex| vertex + 1);
+                    let _ = writeln!(surface, "f {a} {b} {c}");
+                    continue;
+                };
+                // Each place once, before the face that names it.
+                let [p, q, r] = placed.map(|place| {
+                    let next = places.len() + 1;
+                    *places.entry(place.map(f32::to_bits)).or_insert_with(|| {
+                        let [u, v] = place.map(f64::from);
+                        let _ = writeln!(surface, "vt {u:?} {:?}", 1.0 - v);
+                        next
+                    })
+                });
+                let [a, b, c] = triangle.map(|vertex| vertex + 1);
+                let _ = writeln!(surface, "f {a}/{p} {b}/{q} {c}/{r}");
             }
         }
-        [(self.file(), surface), (library, materials)]
+        let texts = [(self.file(), surface), (library, materials)];
+        let texts = texts.map(|(name, text)| (name, text.into_bytes()));
+        texts.into_iter().chain(self.pictures()).collect()
+    }
+
+    fn corners(&self) -> impl Iterator<Item = [[f32; 2]; 3]> {
+        let textures = self.textures.iter();
+        textures.flat_map(|textures| textures.coordinates.iter().copied())
+    }
+
+    /// The pictures, as they were in the part's file; one that goes on in two ways is one.
+    fn pictures(&self) -> impl Iterator<Item = (String, Vec<u8>)> {
+        let list = self.textures.iter().flat_map(|textures| &textures.list);
+        let list: Vec<&BodyTexture> = list.collect();
+        let is_first = |place: usize| {
+            let before = &list[..place];
+            before
+                .iter()
+                .all(|other| other.file.0 != list[place].file.0)
+        };
+        let named = (0..list.len()).filter(|place| is_first(*place));
+        let named = named.map(|place| {
+            let (bytes, ending) = &list[place].file;
+            let name = format!("{}-{}.{ending}", self.name, place + 1);
+            (name, bytes.to_vec())
+        });
+        named.collect::<Vec<_>>().into_iter()
+    }
+
+    /// Name of the picture of a texture.
+    fn picture(&self, texture: usize, list: &[BodyTexture]) -> String {
+        let (bytes, ending) = &list[texture].file;
+        let first = list.iter().position(|other| other.file.0 == *bytes);
+        format!("{}-{}.{ending}", self.name, first.unwrap_or(texture) + 1)
+    }
+}
+
+/// The keys of a material's picture.
+fn write_map(text: &mut String, picture: &str, texture: &BodyTexture) {
+    let _ = writeln!(text, "map_Kd {picture}");
+    if !texture.texture.is_opaque() {
+        let _ = writeln!(text, "map_d {picture}");
+    }
+    if texture.wrap != [Wrap::Repeat; 2] {
+        let [u, v] = texture.wrap.map(|wrap| match wrap {
+            Wrap::Repeat => "repeat",
+            Wrap::Mirror => "mirror",
+            Wrap::Clamp => "clamp",
+        });
+        let _ = writeln!(text, "wrap_Kd {u} {v}");
     }
 }
 

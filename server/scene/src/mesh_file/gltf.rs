@@ -10,6 +10,7 @@ use nalgebra::{Matrix4, Point3};
 
 use super::gltf_container::{buffers, validated};
 use super::gltf_nodes::{Placed, posed_as_it_is};
+use super::gltf_pictures::{laid, picture, texture_coordinates};
 use super::material::{Material, Materials};
 use super::pieces::Pieces;
 use super::read::finite_vertex;
@@ -50,8 +51,10 @@ fn parse_with(
     mut coordinates: Option<&mut Vec<CornerCoordinates>>,
 ) -> Result<RawMesh, Fault> {
     let file = validated(bytes)?;
-    materials.list = file.materials().map(|of| material(&of)).collect();
     let buffers = buffers(&file, directory)?;
+    let read = file.materials().map(|of| material(&of, &buffers));
+    materials.list = read.collect();
+    let have_pictures = materials.have_pictures();
     let Some(scene) = file.default_scene().or_else(|| file.scenes().next()) else {
         return Err(Fault::new("has no scene; export it with one"));
     };
@@ -80,7 +83,7 @@ fn parse_with(
             posed_as_it_is(node, &of_node)?;
             pieces.begin(placed.names());
             for primitive in of_node.primitives() {
-                let before = mesh.triangles.len();
+                let (before, first) = (mesh.triangles.len(), mesh.vertices.len());
                 append(
                     &mut mesh,
                     coordinates.as_deref_mut(),
@@ -97,6 +100,12 @@ fn parse_with(
                 })?;
                 let count = mesh.triangles.len() - before;
                 materials.push(primitive.material().index(), count);
+                if have_pictures {
+                    let used = primitive.material().index();
+                    let used = used.and_then(|place| materials.list[place].picture.as_ref());
+                    let laid = laid(&primitive, used, &buffers, (&mesh, before, first));
+                    materials.coordinates.extend(laid);
+                }
                 pieces.grow(count);
                 materials.vertex_colours |= primitive.get(&gltf::Semantic::Colors(0)).is_some();
             }
@@ -106,26 +115,24 @@ fn parse_with(
     Ok(mesh)
 }
 
-/// What a material says without pictures: a factor of a picture says nothing alone.
-fn material(of: &gltf::Material<'_>) -> Material {
+/// What a material says.
+fn material(of: &gltf::Material<'_>, buffers: &[Vec<u8>]) -> Material {
     let share = |value: f32| value.is_finite().then(|| value.clamp(0.0, 1.0));
     let surface = of.pbr_metallic_roughness();
     let [red, green, blue, alpha] = surface.base_color_factor();
-    let (picture, finish) = (
-        surface.base_color_texture().is_some(),
-        surface.metallic_roughness_texture().is_some(),
-    );
+    // A factor of a picture that is not read says nothing alone.
+    let finish = surface.metallic_roughness_texture().is_some();
     let colour = || Some([share(red)?, share(green)?, share(blue)?]);
     Material {
         name: of.name().unwrap_or("unnamed").to_owned(),
         appearance: Appearance {
-            color: if picture { None } else { colour() },
+            color: colour(),
             roughness: share(surface.roughness_factor()).filter(|_| !finish),
             metallic: share(surface.metallic_factor()).filter(|_| !finish),
-            opacity: share(alpha).filter(|_| of.alpha_mode() == AlphaMode::Blend && !picture),
+            opacity: share(alpha).filter(|_| of.alpha_mode() == AlphaMode::Blend),
         },
-        textured: picture
-            || finish
+        picture: picture(of, buffers),
+        textured: finish
             || of.normal_texture().is_some()
             || of.occlusion_texture().is_some()
             || of.emissive_texture().is_some(),
@@ -207,48 +214,13 @@ fn append(
         .map(|t| t.map(|corner| first as u32 + corner));
     mesh.triangles.extend(placed);
     if let Some(coordinates) = coordinates {
-        let of_vertices = texture_coordinates(primitive, buffers, count)?;
+        let of_vertices = texture_coordinates(primitive, 0, buffers, count)?;
         let of_corners = triangles
             .iter()
             .map(|t| t.map(|corner| of_vertices[corner as usize].map(f64::from)));
         coordinates.extend(of_corners);
     }
     Ok(())
-}
-
-/// The first set of texture coordinates, one pair for each of the `count` vertices.
-fn texture_coordinates(
-    primitive: &gltf::Primitive<'_>,
-    buffers: &[Vec<u8>],
-    count: usize,
-) -> Result<Vec<[f32; 2]>, String> {
-    let accessor = primitive
-        .get(&gltf::Semantic::TexCoords(0))
-        .ok_or("has no texture coordinates; export it with them")?;
-    check_accessor(&accessor, buffers)?;
-    let known = matches!(
-        accessor.data_type(),
-        DataType::F32 | DataType::U8 | DataType::U16
-    );
-    if accessor.dimensions() != Dimensions::Vec2 || !known {
-        return Err(
-            "has texture coordinates that are not pairs of numbers; export it again".into(),
-        );
-    }
-    let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
-    let pairs: Vec<[f32; 2]> = reader
-        .read_tex_coords(0)
-        .ok_or("has unreadable texture coordinates; export it again")?
-        .into_f32()
-        .collect();
-    if pairs.len() == count {
-        Ok(pairs)
-    } else {
-        Err(format!(
-            "has {} texture coordinates for {count} vertices; export it again",
-            pairs.len()
-        ))
-    }
 }
 
 /// Corners to triangles; every second one of a strip is turned.
@@ -279,7 +251,10 @@ fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
 }
 
 /// The accessor lies within its buffer, so that reading it cannot fail.
-fn check_accessor(accessor: &gltf::Accessor<'_>, buffers: &[Vec<u8>]) -> Result<(), String> {
+pub(super) fn check_accessor(
+    accessor: &gltf::Accessor<'_>,
+    buffers: &[Vec<u8>],
+) -> Result<(), String> {
     let number = accessor.index();
     if accessor.sparse().is_some() {
         return Err(format!(

@@ -125,25 +125,38 @@ pub(super) fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec
     Ok(all)
 }
 
-/// The base64 of a buffer that is within the file.
-fn embedded(uri: &str) -> Option<&str> {
+/// The base64 of a buffer or picture that is within the file.
+pub(super) fn embedded(uri: &str) -> Option<&str> {
     let (_, data) = uri.strip_prefix("data:")?.split_once(";base64,")?;
     Some(data)
 }
 
-/// Names of the files that hold the buffers; none of a file that is no glTF.
-pub(super) fn buffer_files(bytes: &[u8]) -> Vec<String> {
-    let named = |buffer: gltf::Buffer<'_>| match buffer.source() {
-        Source::Uri(uri) if embedded(uri).is_none() => {
-            let decoded = percent_decode_str(uri).decode_utf8().ok()?;
-            Some(decoded.into_owned())
-        }
-        _ => None,
+/// Names of the files that hold the buffers and the pictures of colours; none of a file that is no glTF.
+pub(super) fn files(bytes: &[u8]) -> Vec<String> {
+    let Ok(file) = validated(bytes) else {
+        return Vec::new();
     };
-    validated(bytes).map_or_else(
-        |_| Vec::new(),
-        |file| file.buffers().filter_map(named).collect(),
-    )
+    let buffers = file.buffers().filter_map(|buffer| match buffer.source() {
+        Source::Uri(uri) => Some(uri),
+        Source::Bin => None,
+    });
+    let pictures = file.materials().filter_map(|of| {
+        let texture = of.pbr_metallic_roughness().base_color_texture()?;
+        match texture.texture().source()?.source() {
+            gltf::image::Source::Uri { uri, .. } => Some(uri),
+            gltf::image::Source::View { .. } => None,
+        }
+    });
+    let mut names: Vec<String> = Vec::new();
+    for uri in buffers
+        .chain(pictures)
+        .filter(|uri| embedded(uri).is_none())
+    {
+        let decoded = percent_decode_str(uri).decode_utf8();
+        let name = decoded.ok().filter(|name| !names.iter().any(|n| n == name));
+        names.extend(name.map(std::borrow::Cow::into_owned));
+    }
+    names
 }
 
 /// RFC 4648, with or without padding; `None` for any other character.

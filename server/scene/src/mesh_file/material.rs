@@ -1,23 +1,31 @@
 //! Materials of mesh files: which covers the most of a body, and what of the file's look is not drawn.
 
 use std::path::Path;
+use std::sync::Arc;
 
-use taut_proto::mesh_blob::MAX_LOOKS;
+use taut_proto::mesh_blob::{MAX_LOOKS, MAX_MESH_BYTES};
 
 use super::RawMesh;
+use super::body_textures::{BodyTextures, Corners, Pictures};
+use super::laid_out::lay_out;
 use super::mtl::read_library;
+use super::picture_use::PictureUse;
 use super::read::below;
 use crate::appearance::Appearance;
 
 /// Most materials that nobody defines which are named.
 const MAX_UNDEFINED: usize = 3;
+/// Bytes of a vertex, and of a triangle with its look and its place in a texture, of a mesh as it is sent; of all else, at most.
+const SENT_BYTES: [usize; 3] = [24, 12 + 1 + 24, 16 << 10];
 
 /// A material of a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Material {
     pub(super) name: String,
     pub(super) appearance: Appearance,
-    /// It names pictures.
+    /// Its colour is a factor on this.
+    pub(super) picture: Option<PictureUse>,
+    /// It names other pictures.
     pub(super) textured: bool,
     /// The file, or a library beside it, says what it looks like.
     pub(super) is_defined: bool,
@@ -29,8 +37,12 @@ pub(super) struct Materials {
     pub(super) list: Vec<Material>,
     /// Lengths of runs of triangles, in the mesh's order, with the place of their material in `list`; `None` is none.
     runs: Vec<(Option<usize>, usize)>,
+    /// Where the triangles lie in pictures, by the file, v down; not finite where it does not say so. None where no material has a picture.
+    pub(super) coordinates: Vec<Corners>,
     /// Files beside the mesh that say what materials look like, as the mesh names them.
     pub(super) libraries: Vec<String>,
+    /// What was said of libraries that were read, and whether there were others.
+    read: (Vec<String>, bool),
     /// Vertices have colours of their own.
     pub(super) vertex_colours: bool,
     /// Faces have.
@@ -44,6 +56,8 @@ pub(crate) struct FileLook {
     pub(crate) appearance: Appearance,
     /// Where they do not all look alike: lengths of runs of triangles, in the mesh's order, with how each looks.
     pub(crate) parts: Vec<(Appearance, usize)>,
+    /// Textures of these parts.
+    pub(crate) textures: Option<Arc<BodyTextures>>,
     /// What is lost where parts cannot be drawn, as a part of a sentence.
     pub(crate) merged: Option<String>,
     /// What else the file says and nobody draws, as parts of a sentence.
@@ -68,17 +82,32 @@ impl FileLook {
             .collect()
     }
 
+    /// The textures of these parts where they are drawn.
+    pub(crate) fn drawn_textures(
+        &self,
+        said: &Appearance,
+        drawn: &RawMesh,
+    ) -> Option<Arc<BodyTextures>> {
+        let is_drawn = !self.drawn_parts(said, drawn).is_empty();
+        self.textures.clone().filter(|_| is_drawn)
+    }
+
     /// What of it nobody sees where a scene says `said` of the body; `None` if nothing. A scene that names a colour has said what it wants.
     pub(crate) fn not_drawn(&self, said: &Appearance, drawn: &RawMesh) -> Option<String> {
         let unseen = said.opacity.is_none() && self.appearance.opacity == Some(0.0);
         let unseen = unseen.then_some("all of the body: by its file it has the opacity 0");
         let merged = self.merged.iter();
-        let merged = merged.filter(|_| self.drawn_parts(said, drawn).is_empty());
+        let by_parts = !self.drawn_parts(said, drawn).is_empty();
+        let others = (!by_parts && self.textures.is_some()).then(|| OTHER_TRIANGLES.to_owned());
+        let merged = merged.filter(|_| !by_parts).chain(&others);
         let lost = merged.chain(&self.lost).filter(|_| said.color.is_none());
         let all: Vec<&str> = unseen.into_iter().chain(lost.map(String::as_str)).collect();
         (!all.is_empty()).then(|| all.join(", "))
     }
 }
+
+/// What is said of textures that are not drawn.
+const OTHER_TRIANGLES: &str = "its textures: the triangles that are drawn are not those of the file; a `visual` of the same file shows them";
 
 impl Materials {
     /// The next `triangles` of the mesh are of this material.
@@ -91,6 +120,9 @@ impl Materials {
 
     /// Those of the triangles that are `chosen`, in the mesh's order.
     pub(super) fn keep(&mut self, chosen: &[bool]) {
+        let mut is_chosen = chosen.iter();
+        self.coordinates
+            .retain(|_| is_chosen.next().is_some_and(|chosen| *chosen));
         let mut chosen = chosen.iter();
         for (material, count) in std::mem::take(&mut self.runs) {
             let kept = chosen.by_ref().take(count).filter(|kept| **kept).count();
@@ -98,15 +130,16 @@ impl Materials {
         }
     }
 
-    /// Reads the libraries that lie in `directory`; then how the body looks.
-    pub(super) fn look(mut self, mesh: &RawMesh, directory: Option<&Path>) -> FileLook {
-        let mut lost = Vec::new();
-        let mut all_read = true;
+    /// Reads the libraries that lie in `directory`.
+    pub(super) fn read_libraries(&mut self, directory: Option<&Path>) {
         for library in std::mem::take(&mut self.libraries) {
+            let (lost, some_unread) = &mut self.read;
             let inside = directory.zip(below(&library));
-            let path = inside.map(|(directory, name)| directory.join(name));
-            let read = path.map(|path| read_library(&path, &mut self.list));
-            all_read &= matches!(read, Some(Ok(_)));
+            let read = inside.map(|(directory, name)| {
+                let folder = name.parent().unwrap_or(Path::new(""));
+                read_library(&directory.join(&name), folder, &mut self.list)
+            });
+            *some_unread |= !matches!(read, Some(Ok(_)));
             match read {
                 Some(Ok(faults)) => lost.extend(faults),
                 Some(Err(problem)) => lost.push(format!("its materials: {problem}")),
@@ -115,6 +148,17 @@ impl Materials {
                 )),
             }
         }
+    }
+
+    /// Whether a material has a picture.
+    pub(super) fn have_pictures(&self) -> bool {
+        self.list.iter().any(|material| material.picture.is_some())
+    }
+
+    /// Reads the libraries and pictures that lie in `directory`; then how the body looks.
+    pub(super) fn look(mut self, mesh: &RawMesh, directory: Option<&Path>) -> FileLook {
+        self.read_libraries(directory);
+        let (mut lost, some_unread) = std::mem::take(&mut self.read);
         let areas = self.areas(mesh);
         let seen = |place: &usize| areas[*place] > 0.0;
         let places: Vec<usize> = (0..areas.len()).filter(seen).collect();
@@ -123,11 +167,12 @@ impl Materials {
             .iter()
             .copied()
             .reduce(|a, b| if areas[b] > areas[a] { b } else { a });
+        let (factors, textures) = self.textures(mesh, &places, largest, directory, &mut lost);
         let of = |place: usize| self.list.get(place).cloned().unwrap_or_default();
         let material = largest.map(of).unwrap_or_default();
         let others = places
             .iter()
-            .filter(|place| of(**place).appearance != material.appearance)
+            .filter(|place| !of(**place).looks_like(&material))
             .count();
         let merged = (others > 0).then(|| {
             format!(
@@ -146,13 +191,13 @@ impl Materials {
                 material.name
             )),
         }
-        let parts = match merged {
-            Some(_) if places.len() <= MAX_LOOKS => self.parts(of),
-            _ => Vec::new(),
-        };
+        let (mut parts, mut textured) = (Vec::new(), None);
+        if (merged.is_some() || textures.is_some()) && places.len() <= MAX_LOOKS {
+            (parts, textured) = self.parts(of, &factors, textures);
+        }
         // A library that cannot be read is said above, and may define them.
         let undefined = places.iter().filter_map(|place| self.list.get(*place));
-        let undefined = undefined.filter(|material| all_read && !material.is_defined);
+        let undefined = undefined.filter(|material| !some_unread && !material.is_defined);
         lost.extend(undefined.take(MAX_UNDEFINED).map(|material| {
             format!(
                 "its material \"{}\", which no library defines",
@@ -160,7 +205,7 @@ impl Materials {
             )
         }));
         if places.iter().any(|place| of(*place).textured) {
-            lost.push("its textures".to_owned());
+            lost.push("its textures but those of colour".to_owned());
         }
         if self.vertex_colours {
             lost.push("its colours of vertices".to_owned());
@@ -171,25 +216,110 @@ impl Materials {
         FileLook {
             appearance: material.appearance,
             parts,
+            textures: textured.map(Arc::new),
             merged,
             lost,
         }
     }
 
-    /// Runs of triangles that look alike. The opacity is the body's.
-    fn parts(&self, of: impl Fn(usize) -> Material) -> Vec<(Appearance, usize)> {
-        let mut parts: Vec<(Appearance, usize)> = Vec::new();
-        for (material, count) in &self.runs {
-            let look = Appearance {
-                opacity: None,
-                ..of(material.unwrap_or(self.list.len())).appearance
-            };
-            match parts.last_mut() {
-                Some((last, triangles)) if *last == look => *triangles += count,
-                _ => parts.push((look, *count)),
+    /// Reads the pictures of the materials at `places`. Colours of materials become those of their pictures on the whole; what they were, as factors, and the
+    /// textures with the place of each material's.
+    fn textures(
+        &mut self,
+        mesh: &RawMesh,
+        places: &[usize],
+        largest: Option<usize>,
+        directory: Option<&Path>,
+        lost: &mut Vec<String>,
+    ) -> (Vec<Option<[f32; 3]>>, Option<ReadTextures>) {
+        let factors: Vec<_> = self.list.iter().map(|of| of.appearance.color).collect();
+        let on_most = largest.and_then(|place| self.list.get(place));
+        let see_through = on_most.is_some_and(|material| {
+            let by_picture = material
+                .picture
+                .as_ref()
+                .is_some_and(|used| used.is_opacity);
+            by_picture
+                || material
+                    .appearance
+                    .opacity
+                    .is_some_and(|opacity| opacity < 1.0)
+        });
+        let pictures = Pictures::read(&self.list, places, see_through, directory, lost);
+        let drawn = (mesh, &self.runs[..]);
+        let laid_out = lay_out(drawn, &self.coordinates, (&self.list, &pictures), lost);
+        for (place, material) in self.list.iter_mut().enumerate() {
+            let colour = &mut material.appearance.color;
+            match laid_out.means[place] {
+                Some(mean) => {
+                    let factor = colour.unwrap_or([1.0; 3]);
+                    *colour = Some([0, 1, 2].map(|i| factor[i] * mean[i] as f32));
+                }
+                // White is the factor that says nothing of a picture that is not there.
+                None if material.picture.is_some() && *colour == Some([1.0; 3]) => *colour = None,
+                None => {}
             }
         }
-        parts
+        let [of_vertex, of_triangle, more] = SENT_BYTES;
+        let sent = of_vertex * mesh.vertices.len() + of_triangle * mesh.triangles.len() + more;
+        if pictures.is_empty() {
+            return (factors, None);
+        }
+        if sent > MAX_MESH_BYTES {
+            lost.push(format!(
+                "its textures: {} triangles with places in them are more than the {MAX_MESH_BYTES} bytes that are sent; reduce the mesh",
+                mesh.triangles.len()
+            ));
+            return (factors, None);
+        }
+        let of_materials = (0..self.list.len()).map(|place| pictures.of(place));
+        let textures = ReadTextures {
+            of_materials: of_materials.collect(),
+            body: BodyTextures {
+                list: pictures.into_list(),
+                of_looks: Vec::new(),
+                coordinates: laid_out.coordinates,
+            },
+        };
+        (factors, Some(textures))
+    }
+
+    /// Runs of triangles that look alike, and their textures. The opacity is the body's.
+    fn parts(
+        &self,
+        of: impl Fn(usize) -> Material,
+        factors: &[Option<[f32; 3]>],
+        textures: Option<ReadTextures>,
+    ) -> (Vec<(Appearance, usize)>, Option<BodyTextures>) {
+        let mut parts: Vec<(Appearance, usize)> = Vec::new();
+        let mut of_parts: Vec<Option<usize>> = Vec::new();
+        for (material, count) in &self.runs {
+            let place = material.unwrap_or(self.list.len());
+            let mut look = Appearance {
+                opacity: None,
+                ..of(place).appearance
+            };
+            let texture = textures
+                .as_ref()
+                .and_then(|read| *read.of_materials.get(place)?);
+            if texture.is_some() {
+                look.color = Some(factors[place].unwrap_or([1.0; 3]));
+            }
+            match (parts.last_mut(), of_parts.last()) {
+                (Some((last, triangles)), Some(known)) if *last == look && *known == texture => {
+                    *triangles += count;
+                }
+                _ => {
+                    parts.push((look, *count));
+                    of_parts.push(texture);
+                }
+            }
+        }
+        let body = textures.map(|read| BodyTextures {
+            of_looks: of_parts,
+            ..read.body
+        });
+        (parts, body)
     }
 
     /// Area of each material of the list, m^2; of no material at the end.
@@ -207,6 +337,20 @@ impl Materials {
     }
 }
 
+/// Textures that were read.
+struct ReadTextures {
+    /// Place of each material's, if it has one.
+    of_materials: Vec<Option<usize>>,
+    /// Without its looks.
+    body: BodyTextures,
+}
+
+impl Material {
+    fn looks_like(&self, other: &Self) -> bool {
+        self.appearance == other.appearance && self.picture == other.picture
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,8 +364,8 @@ mod tests {
                 color,
                 ..Appearance::default()
             },
-            textured: false,
             is_defined: true,
+            ..Material::default()
         }
     }
 

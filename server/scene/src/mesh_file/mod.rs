@@ -1,11 +1,15 @@
 //! Triangle meshes in files: PLY, OBJ, STL, glTF.
 
+mod body_textures;
 mod gltf;
 mod gltf_container;
 mod gltf_nodes;
+mod gltf_pictures;
+mod laid_out;
 mod material;
 mod mtl;
 mod obj;
+mod picture_use;
 mod pieces;
 mod ply;
 mod polygon;
@@ -14,6 +18,7 @@ mod read;
 mod stl;
 mod texture_coordinates;
 
+pub use body_textures::{BodyTexture, BodyTextures};
 pub(crate) use material::FileLook;
 pub(crate) use pieces::Pieces;
 pub use ply::write_ply;

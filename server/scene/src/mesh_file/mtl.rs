@@ -6,12 +6,20 @@
 //! | `Kd`         | diffuse colour, sRGB as CAD programs write it |
 //! | `d`, `Tr`    | opacity, or one less it; `d` counts before    |
 //! | `Pr`, `Pm`   | roughness and metalness (PBR extension)       |
-//! | `map_...`    | a picture; not drawn                          |
+//! | `map_Kd`     | its colour, times `Kd`; beside the library    |
+//! | `map_d`      | its opacity, where it is the same picture     |
+//! | `map_...`    | another picture; not drawn                    |
+//! | `wrap_Kd`    | ours: how `map_Kd` goes on beyond its edges, along u and v: `repeat`, `mirror`, `clamp` |
+//!
+//! Of the options of `map_Kd` `-s`, `-o` and `-clamp` count.
 
 use std::path::Path;
 
+use taut_proto::Wrap;
+
 use super::material::Material;
 use super::obj;
+use super::picture_use::{PictureSource, PictureUse};
 use super::read::without_mark;
 use crate::appearance::{Appearance, linear};
 use crate::files::read_bytes;
@@ -29,18 +37,33 @@ const OPAQUE: &str = "which is 1: some programs write that of opaque parts, and 
 /// Line, key and what is to be said of it.
 type Remark = (usize, String, &'static str);
 
-/// Says of the named materials of `list` what the file says; lines that are not understood, or not taken at their word, are named.
-pub(super) fn read_library(path: &Path, list: &mut [Material]) -> Result<Vec<String>, Problem> {
+/// Says of the named materials of `list` what the file says, which lies in `folder` seen from the mesh; lines that are not understood, or not taken at their word, are named.
+pub(super) fn read_library(
+    path: &Path,
+    folder: &Path,
+    list: &mut [Material],
+) -> Result<Vec<String>, Problem> {
     let bytes = read_bytes(path, MAX_BYTES)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
-    let faults = parse(&String::from_utf8_lossy(without_mark(&bytes)), list);
+    let faults = parse(&String::from_utf8_lossy(without_mark(&bytes)), folder, list);
     let named = faults.into_iter().take(MAX_FAULTS);
     Ok(named
         .map(|(line, key, why)| format!("`{key}` in line {line} of {file}, {why}"))
         .collect())
 }
 
-fn parse(text: &str, list: &mut [Material]) -> Vec<Remark> {
+/// The pictures that a library names as colours, seen from the mesh; none of one that cannot be read.
+pub(super) fn pictures(path: &Path, folder: &Path) -> Vec<PictureSource> {
+    let bytes = read_bytes(path, MAX_BYTES).unwrap_or_default();
+    let text = String::from_utf8_lossy(without_mark(&bytes));
+    let keys = text
+        .lines()
+        .filter_map(|line| line.trim().split_once(char::is_whitespace));
+    let maps = keys.filter(|(key, _)| *key == "map_Kd");
+    maps.map(|(_, rest)| map(rest, folder).source).collect()
+}
+
+fn parse(text: &str, folder: &Path, list: &mut [Material]) -> Vec<Remark> {
     let mut faults = Vec::new();
     let mut see_through = vec![SeeThrough::default(); list.len()];
     let mut current: Option<usize> = None;
@@ -55,15 +78,19 @@ fn parse(text: &str, list: &mut [Material]) -> Vec<Remark> {
             }
             continue;
         }
-        let rest = rest.split('#').next().unwrap_or_default();
         let Some(place) = current else {
             continue;
         };
+        if take_map(key, rest, folder, &mut list[place], &mut see_through[place]) {
+            continue;
+        }
+        let rest = rest.split('#').next().unwrap_or_default();
         if !take(key, rest, number, &mut list[place], &mut see_through[place]) {
             faults.push((number, key.to_owned(), NO_NUMBERS));
         }
     }
     for (material, said) in list.iter_mut().zip(&see_through) {
+        finish_map(material, said);
         material.appearance.opacity = match (said.dissolve, said.transparency) {
             (Some(opacity), _) => Some(opacity),
             (None, Some((line, 1.0))) => {
@@ -77,13 +104,111 @@ fn parse(text: &str, list: &mut [Material]) -> Vec<Remark> {
     faults
 }
 
-/// What a library says of how far one sees through a material.
-#[derive(Clone, Copy, Debug, Default)]
+/// What a library says of how far one sees through a material, and of how its picture goes on.
+#[derive(Clone, Debug, Default)]
 struct SeeThrough {
     /// Of `d`: the opacity.
     dissolve: Option<f32>,
     /// Line and value of `Tr`: one less the opacity.
     transparency: Option<(usize, f32)>,
+    /// Of `map_d`: a picture.
+    map: Option<PictureSource>,
+    /// Of `wrap_Kd`.
+    wrap: Option<[Wrap; 2]>,
+}
+
+/// `false` where the key names no picture of colour or opacity, and nothing of one.
+fn take_map(
+    key: &str,
+    rest: &str,
+    folder: &Path,
+    material: &mut Material,
+    said: &mut SeeThrough,
+) -> bool {
+    match key {
+        "map_Kd" => material.picture = Some(map(rest, folder)),
+        "map_d" => said.map = Some(map(rest, folder).source),
+        "wrap_Kd" => {
+            let wraps: Vec<Wrap> = rest.split_whitespace().filter_map(wrap_of).collect();
+            said.wrap = wraps.first_chunk().copied();
+        }
+        _ => return false,
+    }
+    true
+}
+
+/// What is known of a material's picture when all of its keys are.
+fn finish_map(material: &mut Material, said: &SeeThrough) {
+    if let (Some(used), Some(wrap)) = (&mut material.picture, said.wrap) {
+        used.wrap = wrap;
+    }
+    match (&mut material.picture, &said.map) {
+        (Some(used), Some(map)) if used.source == *map => used.is_opacity = true,
+        (_, Some(_)) => material.textured = true,
+        (_, None) => {}
+    }
+    // Some programs write black where a picture says the colour.
+    let colour = &mut material.appearance.color;
+    if material.picture.is_some() && *colour == Some([0.0; 3]) {
+        *colour = Some([1.0; 3]);
+    }
+}
+
+fn wrap_of(word: &str) -> Option<Wrap> {
+    match word {
+        "repeat" => Some(Wrap::Repeat),
+        "mirror" => Some(Wrap::Mirror),
+        "clamp" => Some(Wrap::Clamp),
+        _ => None,
+    }
+}
+
+/// The picture of a `map_...` key. Options come before its name, which may hold blanks.
+fn map(rest: &str, folder: &Path) -> PictureUse {
+    let mut rest = obj::name(rest);
+    let (mut scale, mut offset, mut wrap) = ([1.0; 2], [0.0; 2], Wrap::Repeat);
+    while let Some((option, behind)) = rest.split_once(char::is_whitespace) {
+        let words = match option {
+            "-s" | "-o" | "-t" => 3, // one at least
+            "-mm" => 2,
+            "-clamp" | "-blendu" | "-blendv" | "-cc" | "-bm" | "-boost" | "-imfchan"
+            | "-texres" | "-type" => 1,
+            _ => break,
+        };
+        rest = behind.trim_start();
+        let mut numbers = Vec::new();
+        for taken in 0..words {
+            let (word, behind) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+            let number = word.parse().ok().filter(|value: &f64| value.is_finite());
+            if words == 3 && taken > 0 && number.is_none() {
+                break;
+            }
+            numbers.extend(number);
+            if option == "-clamp" && word == "on" {
+                wrap = Wrap::Clamp;
+            }
+            rest = behind.trim_start();
+        }
+        let into = match option {
+            "-s" => &mut scale,
+            "-o" => &mut offset,
+            _ => continue,
+        };
+        into.iter_mut()
+            .zip(numbers)
+            .for_each(|(part, number)| *part = number);
+    }
+    let source = PictureSource::Beside {
+        folder: folder.to_owned(),
+        name: rest.to_owned(),
+    };
+    // v of the file runs up the picture.
+    let ([su, sv], [ou, ov]) = (scale, offset);
+    PictureUse {
+        wrap: [wrap; 2],
+        placing: [[su, 0.0, ou], [0.0, sv, 1.0 - sv - ov]],
+        ..PictureUse::of(source)
+    }
 }
 
 /// `false` where the key is one of ours and its numbers are none.
@@ -137,12 +262,13 @@ mod tests {
         let mut list = [named("red paint"), named("glass")];
         let text = "newmtl other\nKd 1 1 1\nnewmtl red paint\nKd 0.8 0.04 0 # sRGB\nPm 0.5\n\
                     Pr 0.25\nmap_Kd a.png\r\nnewmtl glass\nTr 0.75\nKd 2\n";
-        assert_eq!(parse(text, &mut list), []);
+        assert_eq!(parse(text, Path::new(""), &mut list), []);
         let red = &list[0].appearance;
         let [r, g, b] = red.color.unwrap();
         assert!((r - 0.6038).abs() < 1e-3 && (g - 0.0031).abs() < 1e-3 && b == 0.0);
         assert_eq!((red.roughness, red.metallic), (Some(0.25), Some(0.5)));
-        assert!(list[0].textured && !list[1].textured);
+        assert!(list[0].picture.is_some() && list[1].picture.is_none());
+        assert!(!list[0].textured && !list[1].textured);
         assert_eq!(list[1].appearance.opacity, Some(0.25));
         assert_eq!(list[1].appearance.color, Some([1.0; 3]));
     }
@@ -151,7 +277,7 @@ mod tests {
     fn a_name_may_hold_the_sign_that_begins_comments() {
         let mut list = [named("#c0c0c0"), named("Material #25"), named("Material")];
         let text = "newmtl #c0c0c0\nKd 1 # white\n#Kd 0\nnewmtl Material #25\nd 0.5\n";
-        assert_eq!(parse(text, &mut list), []);
+        assert_eq!(parse(text, Path::new(""), &mut list), []);
         assert_eq!(list[0].appearance.color, Some([1.0; 3]));
         assert_eq!(list[1].appearance.opacity, Some(0.5));
         let defined = list.map(|material| material.is_defined);
@@ -162,7 +288,7 @@ mod tests {
     fn a_comment_behind_a_name_is_none_of_it() {
         let mut list = [named("Material")];
         let text = "newmtl Material # the grey one\nKd 0\nnewmtl Material #25\nKd 1\n";
-        assert_eq!(parse(text, &mut list), []);
+        assert_eq!(parse(text, Path::new(""), &mut list), []);
         assert_eq!(list[0].appearance.color, Some([0.0; 3]));
         assert!(list[0].is_defined);
     }
@@ -178,7 +304,7 @@ mod tests {
             ("d 0", 0.0, None),
         ] {
             let mut list = [named("m")];
-            let said = parse(&format!("newmtl m\n{keys}\n"), &mut list);
+            let said = parse(&format!("newmtl m\n{keys}\n"), Path::new(""), &mut list);
             assert_eq!(list[0].appearance.opacity, Some(opacity), "{keys}");
             let said: Vec<usize> = said.iter().map(|(line, ..)| *line).collect();
             assert_eq!(said, Vec::from_iter(line), "{keys}");
@@ -189,9 +315,63 @@ mod tests {
     fn lines_without_their_numbers_are_named() {
         let mut list = [named("m")];
         let text = "newmtl m\nKd spectral a.rfl\nd nan\nKd 1 0\nNs many\n";
-        let faults = parse(text, &mut list);
+        let faults = parse(text, Path::new(""), &mut list);
         let lines: Vec<usize> = faults.iter().map(|(line, ..)| *line).collect();
         assert_eq!(lines, [2, 3, 4]);
         assert_eq!(list[0].appearance, Appearance::default());
+    }
+
+    #[test]
+    fn a_picture_is_named_behind_its_options() {
+        let of = |text: &str| map(text, Path::new("sub"));
+        for (text, name) in [
+            ("a b.png", "a b.png"),
+            ("-s 2 3 a.png", "a.png"),
+            ("-o 0.5 0.25 0 -s 2 1 1 3d.png", "3d.png"),
+            ("-clamp on -mm 0 1 -bm 0.5 a.jpg", "a.jpg"),
+            ("-imfchan r -texres 256 a.jpg # wood", "a.jpg"),
+            ("C:\\pictures\\a.jpg", "C:\\pictures\\a.jpg"),
+        ] {
+            let PictureSource::Beside {
+                folder,
+                name: found,
+            } = of(text).source
+            else {
+                panic!("{text}");
+            };
+            assert_eq!((found.as_str(), folder.as_path()), (name, Path::new("sub")));
+        }
+        // Twice as often, a quarter up the picture: down it the other way.
+        let used = of("-s 2 2 -o 0 0.25 a.png");
+        assert_eq!(used.place([0.5, 1.0]), [1.0, 0.75]);
+        assert_eq!(of("-clamp on a.png").wrap, [Wrap::Clamp; 2]);
+        assert_eq!(of("sub\\a.png").source.file(), Some("sub/sub/a.png".into()));
+        assert_eq!(of("../a.png").source.file(), None);
+    }
+
+    #[test]
+    fn a_picture_is_the_opacity_only_where_map_d_is_the_same() {
+        for (keys, is_opacity, textured) in [
+            ("map_Kd a.png", false, false),
+            ("map_Kd a.png\nmap_d a.png", true, false),
+            ("map_d b.png\nmap_Kd a.png", false, true),
+            ("map_d a.png", false, true),
+        ] {
+            let mut list = [named("m")];
+            let text = format!("newmtl m\nKd 0 0 0\nwrap_Kd mirror clamp\n{keys}\n");
+            assert_eq!(parse(&text, Path::new(""), &mut list), []);
+            let [material] = list;
+            let used = material.picture.as_ref();
+            assert_eq!(
+                used.is_some_and(|used| used.is_opacity),
+                is_opacity,
+                "{keys}"
+            );
+            assert_eq!(material.textured, textured, "{keys}");
+            let white = used.is_some().then_some([1.0; 3]).or(Some([0.0; 3]));
+            assert_eq!(material.appearance.color, white, "{keys}");
+            let wraps = used.is_none_or(|used| used.wrap == [Wrap::Mirror, Wrap::Clamp]);
+            assert!(wraps, "{keys}");
+        }
     }
 }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use god_object::surface::CornerCoordinates;
 
+use super::body_textures::Corners;
 use super::material::{Material, Materials};
 use super::pieces::Pieces;
 use super::polygon::{Polygons, triangles};
@@ -13,6 +14,8 @@ use super::{Fault, RawMesh};
 
 /// Most corners of one face. More is a broken line.
 const MAX_FACE_CORNERS: usize = 10_000;
+/// The place of a texture coordinate that a corner does not have: there are fewer.
+const NO_COORDINATE: u32 = u32::MAX;
 
 /// The mesh; which material each face names goes to `materials`, its object and groups to `pieces`.
 pub(super) fn parse(
@@ -160,6 +163,18 @@ fn named_libraries(line: &str) -> Vec<String> {
 
 /// Texture coordinates of every triangle that [`parse`] gives, in its order. v of the file runs up the picture; here it runs down.
 pub(super) fn parse_texture_coordinates(bytes: &[u8]) -> Result<Vec<CornerCoordinates>, Fault> {
+    coordinates(bytes, None)
+}
+
+/// The same of a mesh that may have them in part only: the others are not finite. None where a face is no face.
+pub(super) fn coordinates_of_pictures(bytes: &[u8]) -> Vec<Corners> {
+    let found = coordinates(bytes, Some([f64::NAN; 2])).unwrap_or_default();
+    let single = |corners: CornerCoordinates| corners.map(|pair| pair.map(|x| x as f32));
+    found.into_iter().map(single).collect()
+}
+
+/// `stand_in` is for what a corner does not have; without it that is refused.
+fn coordinates(bytes: &[u8], stand_in: Option<[f64; 2]>) -> Result<Vec<CornerCoordinates>, Fault> {
     let text = String::from_utf8_lossy(without_mark(bytes));
     let mut vertices = Vec::new();
     let mut pairs: Vec<[f64; 2]> = Vec::new();
@@ -177,16 +192,23 @@ pub(super) fn parse_texture_coordinates(bytes: &[u8]) -> Result<Vec<CornerCoordi
             Some("vt") => {
                 let [u, v] =
                     [words.next(), words.next()].map(|word| word.unwrap_or("0").parse::<f64>());
-                let (Ok(u), Ok(v)) = (u, v) else {
-                    let text = "a texture coordinate is no number; repair the line";
-                    return Err(Fault::at(number, text));
-                };
-                pairs.push([u, 1.0 - v]);
+                pairs.push(match (u, v, stand_in) {
+                    (Ok(u), Ok(v), _) => [u, 1.0 - v],
+                    (_, _, Some(pair)) => pair,
+                    _ => {
+                        let text = "a texture coordinate is no number; repair the line";
+                        return Err(Fault::at(number, text));
+                    }
+                });
             }
             Some("f") => {
                 let fail = |text| Fault::at(number, text);
                 let corners = face(words.clone(), vertices.len()).map_err(fail)?;
-                let of_corners = words.map(|word| coordinate_of(word, pairs.len()));
+                let of_corner = |word| match (coordinate_of(word, pairs.len()), stand_in) {
+                    (Err(_), Some(_)) => Ok(NO_COORDINATE),
+                    (found, _) => found,
+                };
+                let of_corners = words.map(of_corner);
                 let of_corners = of_corners.collect::<Result<_, _>>().map_err(fail)?;
                 faces.push((number, corners, of_corners));
             }
@@ -207,7 +229,7 @@ pub(super) fn parse_texture_coordinates(bytes: &[u8]) -> Result<Vec<CornerCoordi
             point.ok_or_else(|| missing("vertex", corner, vertices.len()))
         };
         let pair = |corner: u32| {
-            let pair = pairs.get(corner as usize).copied();
+            let pair = pairs.get(corner as usize).copied().or(stand_in);
             pair.ok_or_else(|| missing("texture coordinate", corner, pairs.len()))
         };
         let of_corners: Vec<_> = of_corners.into_iter().map(pair).collect::<Result<_, _>>()?;

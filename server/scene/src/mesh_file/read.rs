@@ -3,8 +3,9 @@
 use std::path::{Component, Path, PathBuf};
 
 use super::material::{FileLook, Materials};
+use super::picture_use::PictureSource;
 use super::pieces::Pieces;
-use super::{RawMesh, gltf, gltf_container, obj, ply, stl};
+use super::{RawMesh, gltf, gltf_container, mtl, obj, ply, stl};
 use crate::files::{MAX_MESH_BYTES, read_bytes};
 use crate::problem::{FileError, Problem};
 
@@ -89,6 +90,12 @@ pub(crate) fn read_part(path: &Path, only: &[String]) -> Result<MeshPart, FileEr
         mut materials,
         pieces,
     } = parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path))?;
+    if extension(path) == "obj" {
+        materials.read_libraries(path.parent());
+        if materials.have_pictures() {
+            materials.coordinates = obj::coordinates_of_pictures(&bytes);
+        }
+    }
     if !only.is_empty() {
         let chosen = pieces.chosen(only);
         if !chosen.contains(&true) {
@@ -105,16 +112,33 @@ pub(crate) fn read_part(path: &Path, only: &[String]) -> Result<MeshPart, FileEr
     Ok(MeshPart { mesh, look, pieces })
 }
 
-/// Names of the files that this mesh file is read with, relative to its folder, be they there or not: libraries of materials, buffers.
+/// Names of the files that this mesh file is read with, relative to its folder, be they there or not: libraries of materials and their pictures, buffers.
 /// None of a mesh that cannot be read: whoever reads it is told why.
 pub(crate) fn files_beside(path: &Path) -> Vec<PathBuf> {
-    let named: fn(&[u8]) -> Vec<String> = match extension(path).as_str() {
-        "obj" => obj::libraries,
-        "glb" | "gltf" => gltf_container::buffer_files,
-        _ => return Vec::new(),
+    let Ok(bytes) = mesh_bytes(path) else {
+        return Vec::new();
     };
-    let names = mesh_bytes(path).map_or_else(|_| Vec::new(), |bytes| named(&bytes));
-    names.iter().filter_map(|name| below(name)).collect()
+    match extension(path).as_str() {
+        "obj" => {
+            let libraries = obj::libraries(&bytes);
+            let mut files: Vec<PathBuf> = libraries.iter().filter_map(|name| below(name)).collect();
+            for library in files.clone() {
+                let folder = library.parent().unwrap_or(Path::new(""));
+                let pictures = mtl::pictures(&path.with_file_name(&library), folder);
+                for file in pictures.iter().filter_map(PictureSource::file) {
+                    if !files.contains(&file) {
+                        files.push(file);
+                    }
+                }
+            }
+            files
+        }
+        "glb" | "gltf" => {
+            let names = gltf_container::files(&bytes);
+            names.iter().filter_map(|name| below(name)).collect()
+        }
+        _ => Vec::new(),
+    }
 }
 
 /// The name of a file in the folder from which it is named, or below it, without the `./` that programs write before it; `None` of one elsewhere.

@@ -475,6 +475,7 @@ fn drawn_body(
     let body = BuiltBody {
         name: name.to_owned(),
         looks: look.drawn_parts(said, &mesh),
+        textures: look.drawn_textures(said, &mesh),
         mesh,
         pose,
         appearance: said.or(look.appearance),

@@ -1,5 +1,7 @@
 //! A scene ready to run.
 
+use std::sync::Arc;
+
 use god_object::spatial::{advance_pose, pose_difference};
 use god_object::{Pose, Settings, World};
 use nalgebra::{Point3, Vector3};
@@ -10,7 +12,7 @@ use super::prepared::Sources;
 use super::spec::View;
 use crate::appearance::Appearance;
 use crate::fidelity::FidelityPlan;
-use crate::mesh_file::RawMesh;
+use crate::mesh_file::{BodyTextures, RawMesh};
 use crate::simplify::Simplified;
 use crate::trace::DeviceTrace;
 
@@ -30,6 +32,8 @@ pub struct BuiltBody {
     pub appearance: Appearance,
     /// How its triangles look where they do not all look alike: lengths of runs of them, in their order. The opacity is the body's.
     pub looks: Vec<(Appearance, usize)>,
+    /// Textures of these looks, if any has one.
+    pub textures: Option<Arc<BodyTextures>>,
 }
 
 /// How an obstacle moves.

@@ -299,18 +299,22 @@ fn what_a_body_cannot_show_of_its_file_is_said_once() {
         lost,
         ["of the look of \"a.gltf\" is not drawn: its colours of vertices"]
     );
-    // A factor of a picture says nothing without the picture.
+    // Without its picture the factor goes on alone, unless it is white, which says nothing.
     let picture = STEEL.replace(
         "\"roughnessFactor\"",
         "\"baseColorTexture\":{\"index\":0},\"roughnessFactor\"",
     );
     folder.gltf("b.gltf", &format!("{picture},{picture}"), "");
     let (look, lost) = folder.look("b.gltf");
-    assert_eq!((look.color, look.roughness), (None, Some(0.5)));
     assert_eq!(
-        lost,
-        ["of the look of \"b.gltf\" is not drawn: its textures"]
+        (look.color, look.roughness),
+        (Some([0.25, 0.5, 0.75]), Some(0.5))
     );
+    let why = "is not drawn: its texture \"a.png\", which cannot be opened";
+    assert!(lost.len() == 1 && lost[0].contains(why), "{lost:?}");
+    let white = picture.replace("[0.25,0.5,0.75,0.3]", "[1,1,1,1]");
+    folder.gltf("c.gltf", &format!("{white},{white}"), "");
+    assert_eq!(folder.look("c.gltf").0.color, None);
     // A scene that names a colour knows what it does.
     let built = folder.built("shape = { mesh = \"b.gltf\" }\ncolor = \"#000000\"", "");
     assert_eq!(built.lost_looks, [""; 0]);

@@ -1,5 +1,8 @@
 //! From scene and workbench to what clients fetch at join: the description and the meshes.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use god_object::Pose;
 use god_object::nalgebra::Point3;
 use taut_link::Content;
@@ -7,8 +10,11 @@ use taut_proto::mesh_blob::{MAX_LOOKS, Positions};
 use taut_proto::scene::{
     BodyDescription, NodeDescription, OutputDescription, ScreenDescription, WindowDescription,
 };
-use taut_proto::{Finish, Look, Looks, MeshBlob, MeshHash, PoseF64, SceneDescription};
-use taut_scene::{Appearance, BuiltBody, BuiltScene, Workbench, srgb};
+use taut_proto::{
+    Finish, Look, Looks, MeshBlob, MeshHash, PoseF64, SceneDescription, Texture, TextureUse,
+    Textures,
+};
+use taut_scene::{Appearance, BodyTexture, BodyTextures, BuiltBody, BuiltScene, Workbench, srgb};
 
 use crate::shared::failure::Failure;
 
@@ -24,11 +30,12 @@ const FINISH: Finish = Finish {
     metallic: 0.0,
 };
 
+/// A body as clients are told of it, with its mesh.
+pub(crate) type Described = (BodyDescription, MeshBlob);
+
 /// Everything of a scene that is drawn: each body as clients are told of it, with its mesh. The god-object first, then obstacles, then
 /// scenery: to clients that is an obstacle of which no state ever tells.
-pub(crate) fn bodies(
-    scene: &BuiltScene,
-) -> impl Iterator<Item = Result<(BodyDescription, MeshBlob), Failure>> {
+pub(crate) fn bodies(scene: &BuiltScene) -> impl Iterator<Item = Result<Described, Failure>> {
     let described = |(index, body): (usize, &BuiltBody)| {
         let usual = usual_colour(index == 0);
         let (hash, blob) = mesh(body, usual)?;
@@ -44,6 +51,14 @@ pub(crate) fn bodies(
     };
     let all = scene.bodies.iter().chain(&scene.scenery);
     all.enumerate().map(described)
+}
+
+/// The textures that the meshes of [`bodies`] name, each once.
+pub(crate) fn textures(scene: &BuiltScene) -> HashMap<MeshHash, Arc<Texture>> {
+    let bodies = scene.bodies.iter().chain(&scene.scenery);
+    let textures = bodies.flat_map(|body| body.textures.as_deref());
+    let all = textures.flat_map(|textures| &textures.list);
+    all.map(|one| (one.hash, one.texture.clone())).collect()
 }
 
 /// The colour of a body that has none of its own.
@@ -103,6 +118,7 @@ pub(super) fn content(
     Ok(Content {
         description,
         meshes: meshes.into_iter().map(|(_, blob)| blob).collect(),
+        textures: textures(scene).into_values().collect(),
         panorama: scene.environment.clone(),
     })
 }
@@ -144,10 +160,25 @@ fn mesh(body: &BuiltBody, usual: [f32; 3]) -> Result<(MeshHash, MeshBlob), Failu
             .with_finish(finish(look))
             .map_err(|error| refused(error.to_string()))?;
     }
-    if let Some(looks) = looks(&body.looks, usual) {
+    let drawn = body.textures.as_deref();
+    if let Some((looks, of_looks)) = looks(&body.looks, drawn, usual) {
         blob = blob
             .with_looks(looks)
             .map_err(|error| refused(error.to_string()))?;
+        if let Some(drawn) = drawn {
+            let used = |one: &BodyTexture| TextureUse {
+                texture: one.hash,
+                wrap: one.wrap,
+            };
+            let textures = Textures {
+                list: drawn.list.iter().map(used).collect(),
+                of_looks,
+                coordinates: drawn.coordinates.clone(),
+            };
+            blob = blob
+                .with_textures(textures)
+                .map_err(|error| refused(error.to_string()))?;
+        }
     }
     let hash = MeshHash::of(&blob.encode().map_err(|error| refused(error.to_string()))?);
     Ok((hash, blob))
@@ -160,20 +191,30 @@ fn finish(look: &Appearance) -> Finish {
     }
 }
 
-/// Looks of runs of triangles; `None` where all look alike, or no mesh holds so many.
-fn looks(parts: &[(Appearance, usize)], usual: [f32; 3]) -> Option<Looks> {
+/// Looks of runs of triangles and the texture of each look; `None` where all look alike, or no mesh holds so many.
+fn looks(
+    parts: &[(Appearance, usize)],
+    drawn: Option<&BodyTextures>,
+    usual: [f32; 3],
+) -> Option<(Looks, Vec<Option<u8>>)> {
     let mut looks = Looks {
         list: Vec::new(),
         of_triangles: Vec::new(),
     };
-    for (part, count) in parts {
+    let mut textures: Vec<Option<u8>> = Vec::new();
+    for (number, (part, count)) in parts.iter().enumerate() {
+        let texture = drawn.and_then(|drawn| *drawn.of_looks.get(number)?);
+        let texture = texture.and_then(|place| u8::try_from(place).ok());
         let look = Look {
             colour: part.color.unwrap_or(usual),
             finish: finish(part),
         };
-        let place = looks.list.iter().position(|known| *known == look);
+        let known = looks.list.iter().zip(&textures);
+        let mut known = known.map(|(known, texture)| (*known, *texture));
+        let place = known.position(|known| known == (look, texture));
         let place = place.unwrap_or_else(|| {
             looks.list.push(look);
+            textures.push(texture);
             looks.list.len() - 1
         });
         let place = u8::try_from(place).ok().filter(|_| place < MAX_LOOKS)?;
@@ -181,7 +222,7 @@ fn looks(parts: &[(Appearance, usize)], usual: [f32; 3]) -> Option<Looks> {
             .of_triangles
             .extend(std::iter::repeat_n(place, *count));
     }
-    (!looks.list.is_empty()).then_some(looks)
+    (!looks.list.is_empty()).then_some((looks, textures))
 }
 
 fn array(point: &Point3<f64>) -> [f64; 3] {

@@ -113,6 +113,7 @@ pub fn content_with(triangles: u32) -> Content {
     Content {
         description: SceneDescription::of_body("bench", body),
         meshes: vec![mesh],
+        textures: Vec::new(),
         panorama: None,
     }
 }
