@@ -15,4 +15,5 @@ mod preview;
 mod screens;
 mod shade;
 mod support;
+mod textured;
 mod windows;

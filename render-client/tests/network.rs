@@ -6,7 +6,7 @@ use crate::live::{Server, can_draw, content, start, wait_for};
 use std::sync::atomic::Ordering;
 
 use taut_proto::barrier::{MasterSettings, Swap};
-use taut_proto::{MeshHash, Panorama};
+use taut_proto::{Finish, Look, Looks, MeshHash, Panorama, Texture, TextureUse, Textures, Wrap};
 use taut_render::RenderError;
 use taut_render::cli::{RenderArgs, TransportArg};
 use taut_render::statistics::Ended;
@@ -81,6 +81,51 @@ fn a_node_draws_in_the_light_that_the_server_names() {
         redness(Some(Panorama::from_fn(|_, _| [1.0, 0.1, 0.02]))),
     );
     assert!(red > 1.3 * studio, "{red} {studio}");
+}
+
+#[test]
+fn a_node_draws_the_textures_that_the_server_sends() {
+    if !can_draw() {
+        return;
+    }
+    let green = Texture::new((1, 1), vec![[0, 255, 0, 255]]).expect("a texture");
+    let mut content = content();
+    let mesh = &content.meshes[0];
+    let triangles = mesh.triangles().len();
+    let looks = Looks {
+        list: vec![Look {
+            colour: [1.0; 3],
+            finish: Finish {
+                roughness: 1.0,
+                metallic: 0.0,
+            },
+        }],
+        of_triangles: vec![0; triangles],
+    };
+    let textures = Textures {
+        list: vec![TextureUse {
+            texture: MeshHash::of(&green.encode()),
+            wrap: [Wrap::Repeat; 2],
+        }],
+        of_looks: vec![Some(0)],
+        coordinates: vec![[[0.0; 2], [1.0, 0.0], [0.0, 1.0]]; triangles],
+    };
+    let mesh = mesh.clone().with_looks(looks).expect("of the mesh");
+    let mesh = mesh.with_textures(textures).expect("of the mesh");
+    content.description.god_object.mesh = MeshHash::of(&mesh.encode().expect("small"));
+    content.meshes[0] = mesh;
+    content.textures = vec![std::sync::Arc::new(green)];
+    let server = Server::serving(None, content);
+    let mut args = server.args("both");
+    (args.frames, args.out) = (Some(1), Some(server.pictures()));
+    taut_render::run(args).expect("draws");
+    let path = server.pictures().join("both-table-00001.png");
+    let picture = image::open(path).expect("a picture").to_rgba8();
+    let count = |kind: &dyn Fn(&[u8; 4]) -> bool| picture.pixels().filter(|p| kind(&p.0)).count();
+    let green = count(&|p| p[1] > 60 && p[1] / 2 > p[0].max(p[2]));
+    let orange = count(&|p| p[0] > 90 && p[0] / 2 > p[2]);
+    server.stop();
+    assert!(green > 30 && orange == 0, "{green} green, {orange} orange");
 }
 
 #[test]

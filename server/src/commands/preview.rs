@@ -218,6 +218,140 @@ mod tests {
         assert!(red > 10_000 && green + blue == 0, "{red} {green} {blue}");
     }
 
+    /// A board of 4 x 4 squares of red, green, blue and yellow that looks like none of its mirrored and turned ones.
+    fn of_square(column: u32, row: u32) -> usize {
+        ((column + row * row + 3 * (column / 2) * row) % 4) as usize
+    }
+
+    fn write_board(path: &Path) {
+        let colours = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]];
+        let board = image::RgbImage::from_fn(64, 64, |x, y| {
+            image::Rgb(colours[of_square(x / 16, y / 16)])
+        });
+        board.save(path).expect("written");
+    }
+
+    /// A square of 0.2 m with the board on it that looks to the front, as OBJ and as glTF with its picture beside it.
+    fn write_squares(folder: &Path) {
+        let obj = "mtllib square.mtl\nusemtl m\nv -0.1 0 -0.1\nv 0.1 0 -0.1\nv 0.1 0 0.1\nv -0.1 0 0.1\n\
+            vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+        let mut bytes = Vec::new();
+        for number in [
+            -0.1, 0.0, -0.1, 0.1, 0.0, -0.1, 0.1, 0.0, 0.1, -0.1, 0.0, 0.1_f32,
+        ] {
+            bytes.extend(number.to_le_bytes());
+        }
+        // v runs down.
+        for number in [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0_f32] {
+            bytes.extend(number.to_le_bytes());
+        }
+        for index in [0_u16, 1, 2, 0, 2, 3] {
+            bytes.extend(index.to_le_bytes());
+        }
+        let gltf = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+            "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"indices":2,"material":0}]}],
+            "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicFactor":0}}],
+            "textures":[{"source":0}],"images":[{"uri":"board.png"}],
+            "buffers":[{"uri":"square.bin","byteLength":92}],
+            "bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":32},{"buffer":0,"byteOffset":80,"byteLength":12}],
+            "accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[-1,-1,-1],"max":[1,1,1]},
+            {"bufferView":1,"componentType":5126,"count":4,"type":"VEC2"},{"bufferView":2,"componentType":5123,"count":6,"type":"SCALAR"}]}"#;
+        for (name, content) in [
+            ("square.obj", obj.as_bytes()),
+            ("square.mtl", b"newmtl m\nmap_Kd board.png\n"),
+            ("square.bin", &bytes),
+            ("square.gltf", gltf.as_bytes()),
+        ] {
+            fs::write(folder.join(name), content).expect("written");
+        }
+        write_board(&folder.join("board.png"));
+    }
+
+    /// The picture of a scene of one body that shows its front to the eye, upright; `None`, said aloud, without an adapter.
+    fn from_the_front(path: &Path, body: &str) -> Option<image::RgbaImage> {
+        // The axes of the preview's eye: 0.611 rad to the right of the front, 0.489 rad up.
+        let turn = UnitQuaternion::from_scaled_axis(nalgebra::Vector3::z() * 0.611)
+            * UnitQuaternion::from_scaled_axis(-nalgebra::Vector3::x() * 0.489);
+        let [x, y, z] = turn.imag().into();
+        let text = format!(
+            "name = \"x\"\n[god_object]\nmass = 1.0\n{body}\n[view]\nrotation = [{}, {x}, {y}, {z}]\n",
+            turn.w
+        );
+        fs::write(path, text).expect("written");
+        let scene = path.display().to_string();
+        match preview(&scene, &GpuChoice::default(), (320, 240), 1) {
+            Ok(preview) => Some(preview.picture(0).expect("not drawn")),
+            Err(Failure::BadInput(error)) => panic!("{error}"),
+            Err(error) => {
+                taut_test_kit::left_out(error);
+                None
+            }
+        }
+    }
+
+    /// All squares are where they are on the board, whose side takes 0.9 of the picture's height.
+    fn assert_board(image: &image::RgbaImage, which: &str) {
+        for (column, row) in (0..16).map(|place| (place % 4, place / 4)) {
+            let from_middle = |at: u32| (at as f32 - 1.5) / 4.0 * 0.9 * 240.0;
+            let (x, y) = (160.0 + from_middle(column), 120.0 + from_middle(row));
+            let [red, green, blue, _] = image.get_pixel(x as u32, y as u32).0;
+            let strong = [red > 50, green > 50, blue > 50];
+            let expected = [
+                [true, false, false],
+                [false, true, false],
+                [false, false, true],
+                [true, true, false],
+            ][of_square(column, row)];
+            assert_eq!(
+                strong, expected,
+                "{which}: {column} {row}: {red} {green} {blue}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_board_on_a_square_reaches_the_pixels_the_right_way_up() {
+        let folder = tempfile::tempdir().expect("no temporary directory");
+        write_squares(folder.path());
+        for file in ["square.obj", "square.gltf"] {
+            let body = format!(
+                "shape = {{ sphere = {{ radius = 0.01 }} }}\nvisual = {{ mesh = \"{file}\" }}"
+            );
+            let Some(image) = from_the_front(&folder.path().join("scene.toml"), &body) else {
+                return;
+            };
+            assert_board(&image, file);
+        }
+    }
+
+    /// The square with a back, as thick as wide and without a picture there, by way of an import that simplifies what is felt.
+    #[test]
+    fn an_imported_part_shows_its_picture_whatever_is_felt_of_it() {
+        let folder = tempfile::tempdir().expect("no temporary directory");
+        write_squares(folder.path());
+        let mut part = fs::read_to_string(folder.path().join("square.obj")).expect("read");
+        part += "usemtl plain\nv -0.1 0.01 -0.1\nv 0.1 0.01 -0.1\nv 0.1 0.01 0.1\nv -0.1 0.01 0.1\n\
+            f 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n";
+        fs::write(folder.path().join("part.obj"), part).expect("written");
+        let made = folder.path().join("made");
+        let report = taut_scene::import(&taut_scene::ImportRequest {
+            parts: vec![folder.path().join("part.obj")],
+            folder: made.clone(),
+            unit: "m".parse().ok(),
+            simplify: Some(1e-4),
+            ..Default::default()
+        });
+        let report = report.expect("imported").to_string();
+        assert!(!report.contains("its texture"), "{report}");
+        assert!(made.join("part-visual-1.png").is_file());
+        let body = "shape = { mesh = \"part.ply\" }\nvisual = { mesh = \"part-visual.obj\" }\n\
+            pose = { position = [0.0, -0.005, 0.0], rotation = [1.0, 0.0, 0.0, 0.0] }";
+        let Some(image) = from_the_front(&made.join("front.toml"), body) else {
+            return;
+        };
+        assert_board(&image, &report);
+    }
+
     #[test]
     fn scenery_is_drawn_and_so_is_what_stands_in_its_own_colour() {
         let folder = tempfile::tempdir().expect("no temporary directory");

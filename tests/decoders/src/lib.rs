@@ -104,6 +104,12 @@ pub const DECODERS: [Decoder; 33] = [
         screens::environment_hdr_seeds,
         1024,
     ),
+    decoder(
+        "picture",
+        screens::picture,
+        screens::picture_seeds,
+        24 << 10, // pixels, 2048 for a byte, as they come, as texels twice, as bytes
+    ),
     decoder("texture", wire::texture, wire::texture_seeds, 4),
     decoder("panorama", wire::panorama, wire::panorama_seeds, 2),
     decoder("scene_edit", files::scene_edit, files::scene_edit_seeds, 64),

@@ -67,6 +67,29 @@ pub(crate) fn environment_hdr_seeds() -> Vec<Vec<u8>> {
     vec![file, empty.to_vec()]
 }
 
+/// A picture on a surface, PNG or JPEG: what is read can be sent.
+pub(crate) fn picture(bytes: &[u8]) {
+    if let Ok(texture) = taut_scene::read_picture(bytes) {
+        crate::wire::texture(&texture.encode());
+    }
+}
+
+pub(crate) fn picture_seeds() -> Vec<Vec<u8>> {
+    let colours =
+        image::RgbImage::from_fn(16, 8, |x, y| image::Rgb([16 * x as u8, 32 * y as u8, 128]));
+    let encoded = |format| {
+        let mut file = std::io::Cursor::new(Vec::new());
+        let written = colours.write_to(&mut file, format);
+        assert!(written.is_ok(), "{written:?}");
+        file.into_inner()
+    };
+    vec![
+        encoded(image::ImageFormat::Png),
+        encoded(image::ImageFormat::Jpeg),
+        grey_png(),
+    ]
+}
+
 /// Two by two grey pixels.
 fn grey_png() -> Vec<u8> {
     let mut file = std::io::Cursor::new(Vec::new());

@@ -8,6 +8,7 @@ mod gltf_pictures;
 mod laid_out;
 mod material;
 mod mtl;
+mod mtl_map;
 mod obj;
 mod picture_use;
 mod pieces;
@@ -17,6 +18,7 @@ mod raw_mesh;
 mod read;
 mod stl;
 mod texture_coordinates;
+mod textured_parts;
 
 pub use body_textures::{BodyTexture, BodyTextures};
 pub(crate) use material::FileLook;

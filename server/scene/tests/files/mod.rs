@@ -12,6 +12,7 @@ mod scene_page;
 mod shipped;
 mod simplification;
 mod surfaces;
+mod textured;
 mod workbench_faults;
 mod workbench_inputs;
 mod workbench_lookers_on;
