@@ -24,8 +24,9 @@ const MOST_KEPT: f64 = 0.75;
 /// No level is off by more than this share of the mesh's size: what would be drawn with it is a few pixels large.
 const MOST_ERROR: f32 = 0.01;
 /// Where a picture slips on a surface, as it does where fewer triangles carry it, levels are sought within this first, then within twice as much and so on
-/// up to [`MOST_ERROR`]: a slip counts as a place that is off as far.
-const LEAST_SLIP: f32 = MOST_ERROR / 32.0;
+/// up to [`MOST_ERROR`]: a slip counts as a place that is off as far. What is less is lost in the rounding of quadrics in single precision, about the root
+/// of 1e-7.
+const LEAST_SLIP: f32 = MOST_ERROR / 16.0;
 /// A normal that is off by 1 counts as much as a place that is off by this share of the mesh's size: on a body of 500 pixels half of a pixel is as
 /// much as 6 degrees.
 const NORMAL_WEIGHT: f32 = 0.01;

@@ -147,7 +147,7 @@ fn drawn(meshes: Vec<TriangleMesh>) -> Option<RgbaImage> {
 fn at(image: &RgbaImage, across: f32, down: f32) -> [u8; 4] {
     let place = |share: f32| {
         let metres = (2.0 * share - 1.0) * SQUARE;
-        ((metres + SCREEN) / (2.0 * SCREEN) * PIXELS as f32) as u32
+        ((metres + SCREEN) / (2.0 * SCREEN) * image.width() as f32) as u32
     };
     image.get_pixel(place(across), place(down)).0
 }
@@ -335,7 +335,10 @@ fn waves(side: u32) -> TriangleMesh {
 
 #[test]
 fn fewer_triangles_show_the_picture_where_all_of_them_do() {
-    let Some(mut canvas) = canvas(stage(vec![waves(150)])) else {
+    // So few pixels that half of one is 4 mm at the nearest place.
+    let mut stage = stage(vec![waves(150)]);
+    stage.screens[0].pixels = (80, 80);
+    let Some(mut canvas) = canvas(stage) else {
         return;
     };
     canvas.wait_for_levels();
@@ -356,12 +359,13 @@ fn fewer_triangles_show_the_picture_where_all_of_them_do() {
         (image, drawn)
     };
     let ((few, drawn_few), (all, drawn_all)) = (picture(false), picture(true));
-    assert!(drawn_few < drawn_all * 3 / 4, "{drawn_few} of {drawn_all}");
+    // Shadows, whose texels are finer, are half of them.
+    assert!(drawn_few < drawn_all * 4 / 5, "{drawn_few} of {drawn_all}");
     let differ =
         |(a, b): &(&Rgba<u8>, &Rgba<u8>)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 60);
     let count = few.pixels().zip(all.pixels()).filter(differ).count();
-    // The edges between the board's squares are 3 lines each way of 160 pixels; a slip of half a pixel changes a few of them by so much.
-    assert!(count < 100, "{count} pixels");
+    // The edges between the board's squares are 3 lines each way of 64 pixels; a slip of half a pixel changes some of them by so much.
+    assert!(count < 60, "{count} pixels");
     for (column, row) in (0..16).map(|place| (place % 4, place / 4)) {
         let middle = [column, row].map(|at| (at as f32 + 0.5) / 4.0);
         let found = colour(at(&few, middle[0], middle[1]));

@@ -123,7 +123,9 @@ impl Materials {
         let mut chosen = chosen.iter();
         for (material, count) in std::mem::take(&mut self.runs) {
             let kept = chosen.by_ref().take(count).filter(|kept| **kept).count();
-            self.push(material, kept);
+            if kept > 0 {
+                self.push(material, kept);
+            }
         }
     }
 
