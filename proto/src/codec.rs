@@ -215,6 +215,11 @@ impl Reader<'_> {
         Ok(())
     }
 
+    /// Whether every byte is read.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.left == 0
+    }
+
     /// A u16 count, refused if above `max` or above the bytes left (an element has at least one byte).
     fn take_count(&mut self, what: &'static str, max: usize) -> Result<usize, DecodeError> {
         let len = usize::from(self.take::<u16>()?);

@@ -17,7 +17,9 @@
 //! both proofs are over the exporter of this very TLS connection, which is fresh, so an old or relayed proof does not verify.
 //! After that the server sends `Group` on the control stream at join and whenever the membership changes, to all but devices, and `Events` at join and whenever there are some.
 //! A mesh, or the panorama of the light, is asked for on a stream of its own: `MeshRequest`, then `MeshHeader` and the raw bytes of the blob.
+//! Pictures of what a node shows are asked for by the server, on a stream of its own as well: see [`crate::picture`].
 
+pub use crate::picture::{NoPicture, Offers, PictureHeader, PictureRequest};
 pub use crate::role::Role;
 
 use crate::{
@@ -93,6 +95,8 @@ wire_struct! {
         pub proof: [u8; 32],
         /// By what right it joins: which secret the proof is of.
         pub grant: Grant,
+        /// What else it does.
+        pub offers: Offers,
     }
 }
 
@@ -223,6 +227,9 @@ pub enum ControlMessage {
     Group(Group),
     Events(EventBatch),
     StatesBy(StatesBy),
+    PictureRequest(PictureRequest),
+    PictureHeader(PictureHeader),
+    NoPicture(NoPicture),
 }
 
 impl ControlMessage {
@@ -243,6 +250,9 @@ impl ControlMessage {
             ControlMessage::Group(_) => "Group",
             ControlMessage::Events(_) => "Events",
             ControlMessage::StatesBy(_) => "StatesBy",
+            ControlMessage::PictureRequest(_) => "PictureRequest",
+            ControlMessage::PictureHeader(_) => "PictureHeader",
+            ControlMessage::NoPicture(_) => "NoPicture",
         }
     }
 
@@ -340,6 +350,7 @@ wire_messages! {
     MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
     Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10, Group(Group) = 14,
     Events(EventBatch) = 15, StatesBy(StatesBy) = 16,
+    PictureRequest(PictureRequest) = 17, PictureHeader(PictureHeader) = 18, NoPicture(NoPicture) = 19,
 }
 
 wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });

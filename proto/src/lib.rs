@@ -68,6 +68,7 @@ mod octahedral;
 pub mod pace;
 pub mod panorama;
 pub mod path;
+pub mod picture;
 pub mod pin;
 pub mod pose;
 pub mod proof;

@@ -7,6 +7,7 @@
 use crate::{
     DecodeError, EncodeError,
     codec::{Reader, Wire, Writer},
+    picture::{MAX_PICTURE_BYTES, MAX_PICTURE_EDGE},
 };
 
 /// Least and most of a number, with its unit and its sense.
@@ -106,6 +107,10 @@ pub const FORCE: Bounds = bounds(
 );
 /// Work on the hand: the device port keeps account of no more than it may owe.
 pub const ENERGY: Bounds = bounds(-1e9, 1e9, "-10^9 to 10^9 J");
+/// Pixels of a picture of a screen, across or down.
+pub const PICTURE_EDGE: Bounds = bounds(1.0, MAX_PICTURE_EDGE as f64, "1 to 1280");
+/// Bytes of one.
+pub const PICTURE_BYTES: Bounds = bounds(1.0, MAX_PICTURE_BYTES as f64, "1 to 5 MiB");
 /// Between the pupils.
 pub const PUPILS: Bounds = bounds(0.0, 1.0, "0 to 1 m");
 /// A share.
@@ -250,8 +255,8 @@ impl Number {
 /// Every number of every message, message by message.
 pub fn numbers() -> impl Iterator<Item = &'static Number> {
     use crate::{
-        barrier, constraints, control, coupling, events, force, group, head, input, path, pose,
-        scene, state,
+        barrier, constraints, control, coupling, events, force, group, head, input, path, picture,
+        pose, scene, state,
     };
     use crate::{confirmation, stats, time, wrench};
     [
@@ -284,6 +289,8 @@ pub fn numbers() -> impl Iterator<Item = &'static Number> {
         control::Welcome::NUMBERS,
         control::Refusal::NUMBERS,
         control::MeshHeader::NUMBERS,
+        picture::PictureRequest::NUMBERS,
+        picture::PictureHeader::NUMBERS,
         coupling::EdgeCoupling::NUMBERS,
         coupling::EdgeSettings::NUMBERS,
         coupling::EdgeAdaptation::NUMBERS,

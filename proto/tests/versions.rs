@@ -70,7 +70,7 @@ fn a_refusal_reads_the_same_in_both_releases() {
 
 #[test]
 fn a_hello_is_read_by_its_range_whatever_a_later_version_adds() {
-    let ControlMessage::Hello(mut hello) = message("hello") else {
+    let ControlMessage::Hello(mut hello) = message("hello_with_pictures") else {
         panic!("a Hello");
     };
     hello.versions = range(5, 6);

@@ -7,6 +7,7 @@ use crate::error::RenderError;
 use crate::hud::Overlay;
 use crate::node_status::NodeStatus;
 use crate::renderer::{Corrected, Gpu, OffScreen, PictureTarget, Renderer};
+use crate::snapshot::{Frame, Part};
 use crate::stage::{Stage, StageScreen};
 use crate::stereo::Picture;
 use crate::texture_limits::{check_masks, picture_size};
@@ -28,6 +29,9 @@ pub struct Canvas {
 struct Sheet {
     /// Place of the screen in the stage.
     screen: usize,
+    /// Place of the picture among those of the screen.
+    place: usize,
+    picture: Picture,
     name: String,
     target: PictureTarget,
     image: OffScreen,
@@ -60,12 +64,19 @@ impl Canvas {
         for (index, screen) in stage.screens.iter().enumerate() {
             let size = picture_size(screen, gpu.longest_side())?;
             let pictures = Picture::of(screen.stereo);
-            sheets.extend(pictures.iter().enumerate().map(|(place, picture)| Sheet {
-                screen: index,
-                name: format!("{}{}", screen.name, picture.suffix),
-                target: target_of(gpu, &renderer, screen, (place, picture), size),
-                image: OffScreen::new(gpu, size),
-            }));
+            sheets.extend(
+                pictures
+                    .into_iter()
+                    .enumerate()
+                    .map(|(place, picture)| Sheet {
+                        screen: index,
+                        place,
+                        name: format!("{}{}", screen.name, picture.suffix),
+                        target: target_of(gpu, &renderer, screen, (place, &picture), size),
+                        image: OffScreen::new(gpu, size),
+                        picture,
+                    }),
+            );
         }
         Ok((renderer, sheets))
     }
@@ -134,6 +145,38 @@ impl Canvas {
         }
         gpu.queue.submit([encoder.finish()]);
         gpu.finish()
+    }
+
+    /// The frame that was drawn last, for these eyes, and shown at `shown_ns`, to be drawn again.
+    pub(crate) fn frame<'c>(&'c self, eyes: &'c Eyes, shown_ns: u64) -> Frame<'c> {
+        Frame {
+            gpu: &self.gpu,
+            renderer: &self.renderer,
+            stage: &self.stage,
+            eyes,
+            format: OffScreen::FORMAT,
+            shown_ns,
+        }
+    }
+
+    /// Its pictures.
+    pub(crate) fn parts(&self) -> Vec<Part<'_>> {
+        let part = |sheet| {
+            let Sheet {
+                screen,
+                place,
+                picture,
+                image,
+                ..
+            }: &Sheet = sheet;
+            Part {
+                screen: *screen,
+                place: *place,
+                picture,
+                size: image.size(),
+            }
+        };
+        self.sheets.iter().map(part).collect()
     }
 
     /// Name (screen, and eye where it has a picture of its own) and content of each picture.

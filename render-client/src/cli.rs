@@ -255,6 +255,7 @@ fn client_options(args: &RenderArgs) -> Result<ClientOptions, RenderError> {
     options.transport = args.transport.into();
     options.mesh_cache = args.membership.cache()?;
     options.priority = Some(FRAME_PRIORITY); // drawing itself stays in the class of everybody
+    options.pictures = true;
     Ok(options)
 }
 

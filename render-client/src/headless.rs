@@ -5,13 +5,13 @@ use std::time::{Duration, Instant};
 
 use taut_proto::scene::Show;
 
-use crate::canvas::Canvas;
+use crate::canvas::{Canvas, eyes_of};
 use crate::error::RenderError;
 use crate::node_status::LinkHealth;
 use crate::pacing::Pacer;
 use crate::session::{Session, Turn};
 use crate::statistics::{Ended, Statistics};
-use crate::timeline::Timeline;
+use crate::timeline::{Latched, Timeline};
 
 /// Longest sleep between two looks at signals and the server.
 const LONGEST_SLEEP: Duration = Duration::from_millis(50);
@@ -93,6 +93,7 @@ pub(crate) fn run(
             let shown_ns = session.now_ns().unwrap_or(taken_ns);
             statistics.frame(&latched, taken_ns, shown_ns);
             statistics.swap(late);
+            show_server(session, canvas, &latched);
             tell(session, canvas);
             if finish(canvas, statistics, plan)? {
                 return Ok(Ended::Frames);
@@ -109,7 +110,7 @@ pub(crate) fn run(
             .and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
         if let Some((taken_ns, mut latched)) = latched {
             let drawn = Some((latched.state.time_ns, latched.stale, shown(link)));
-            if drawn != last_drawn {
+            if drawn != last_drawn || session.is_picture_asked() {
                 last_drawn = drawn;
                 canvas.set_status(statistics.status(&plan.node, link));
                 // Off-screen a picture is looked at when it is done.
@@ -117,6 +118,7 @@ pub(crate) fn run(
                 canvas.draw(&latched, show, plan.out.is_some())?;
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
                 statistics.frame(&latched, taken_ns, drawn_ns);
+                show_server(session, canvas, &latched);
                 tell(session, canvas);
                 if finish(canvas, statistics, plan)? {
                     return Ok(Ended::Frames);
@@ -134,6 +136,12 @@ pub(crate) fn run(
         };
         std::thread::sleep(rest.min(LONGEST_SLEEP));
     }
+}
+
+/// Gives the server the pictures of this frame, if it wants them.
+fn show_server(session: &Session, canvas: &Canvas, latched: &Latched) {
+    let eyes = eyes_of(canvas.stage(), latched);
+    session.give_pictures(|shown_ns| canvas.frame(&eyes, shown_ns), || canvas.parts());
 }
 
 fn tell(session: &mut Session, canvas: &Canvas) {

@@ -32,6 +32,7 @@ pub mod preview;
 pub mod renderer;
 mod runtime_directory;
 mod session;
+mod snapshot;
 pub mod stage;
 pub mod statistics;
 pub mod stereo;

@@ -18,6 +18,7 @@ use crate::description::{self, Overrides};
 use crate::error::RenderError;
 use crate::monitor::Places;
 use crate::node_status::LinkHealth;
+use crate::snapshot::{Frame, Part, Snapshots};
 use crate::stage::Stage;
 use crate::textures::{KnownTextures, check_texels};
 use crate::timeline::{Contact, Head, State, Timeline};
@@ -44,6 +45,7 @@ pub(crate) struct Session {
     /// Sessions of which the first frame was told.
     reported: u64,
     stop: Arc<AtomicBool>,
+    snapshots: Snapshots,
 }
 
 /// What a new session brings.
@@ -131,6 +133,7 @@ impl Session {
             began,
             reported: 0,
             stop,
+            snapshots: Snapshots::default(),
         };
         Ok(Some((session, stage, show)))
     }
@@ -168,6 +171,23 @@ impl Session {
             "{}: joined {} and draws {pictures} with {adapter}; {clock}",
             self.node, self.server,
         ));
+    }
+
+    /// Whether the server wants to see what this node shows.
+    pub(crate) fn is_picture_asked(&self) -> bool {
+        self.link.is_picture_asked()
+    }
+
+    /// Gives the server pictures of the frame that was shown last, if it asked for them; `parts` has what is shown.
+    pub(crate) fn give_pictures<'f>(
+        &self,
+        frame: impl FnOnce(u64) -> Frame<'f>,
+        parts: impl FnOnce() -> Vec<Part<'f>>,
+    ) {
+        if let Some(ask) = self.link.take_picture_ask() {
+            let shown_ns = self.now_ns().unwrap_or(0);
+            self.snapshots.answer(ask, &frame(shown_ns), &parts());
+        }
     }
 
     /// How the link is, for the HUD.

@@ -363,7 +363,7 @@ impl App<'_> {
         let latched = released.or_else(|| self.timeline.latch(taken_ns))?;
         let health = self.session.health();
         let drawn = (latched.state.time_ns, latched.stale, shown(health));
-        if self.last_drawn == Some(drawn) && !locked {
+        if self.last_drawn == Some(drawn) && !locked && !session.is_picture_asked() {
             return None;
         }
         Some(Due {
@@ -415,7 +415,9 @@ impl App<'_> {
             renderer.draw(gpu, &mut encoder, screen, &eyes, &pane.target, &view);
             textures.push((place, pane, texture));
         }
-        if textures.is_empty() && !locked {
+        let visible: Vec<usize> = textures.iter().map(|(place, ..)| *place).collect();
+        if visible.is_empty() && !locked {
+            self.give_pictures(&visible);
             return Ok(false); // all windows are hidden
         }
         gpu.queue.submit([encoder.finish()]);
@@ -439,7 +441,23 @@ impl App<'_> {
         self.last_drawn = Some(drawn);
         let drawn_ns = self.session.now_ns().unwrap_or(taken_ns);
         self.statistics.frame(&latched, taken_ns, drawn_ns);
+        self.give_pictures(&visible);
         Ok(true)
+    }
+
+    /// Gives the server the pictures of the frame that was drawn last, if it wants them: of the windows at these places, since the others are hidden.
+    fn give_pictures(&self, visible: &[usize]) {
+        let Some(display) = &self.screen else {
+            return;
+        };
+        let parts = || {
+            let panes = visible.iter().filter_map(|place| display.panes.get(*place));
+            panes.map(Pane::part).collect()
+        };
+        self.session.give_pictures(
+            |shown_ns| display.frame(&self.stage, &self.eyes, shown_ns),
+            parts,
+        );
     }
 
     fn tell_first_frame(&mut self) {

@@ -1,6 +1,7 @@
 //! The tests of this package in one binary: linked once, run side by side.
 #![allow(unreachable_pub, reason = "helpers of the tests")]
 
+mod asked_pictures;
 mod detail;
 mod environment;
 mod geometry;

@@ -14,6 +14,10 @@ mod moving_obstacle;
 mod no_allocation;
 mod operation;
 mod operator;
+#[cfg(unix)]
+mod operator_pictures;
+#[cfg(unix)]
+mod operator_recordings;
 mod own_device;
 mod record;
 mod recording;

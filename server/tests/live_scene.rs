@@ -111,7 +111,7 @@ fn along_x(served: &Served, revision: u32) -> [f64; 2] {
 }
 
 impl Served {
-    fn edit(&self, wish: &Value) -> (u16, String) {
+    pub(crate) fn edit(&self, wish: &Value) -> (u16, String) {
         let body = wish.to_string();
         let head = format!(
             "{}Authorization: Bearer {TOKEN}\r\nContent-Length: {}\r\n",
@@ -132,7 +132,7 @@ impl Served {
         (status.unwrap_or(0), text.trim().to_owned())
     }
 
-    fn scene(&self) -> Value {
+    pub(crate) fn scene(&self) -> Value {
         let (status, text) = self.ask("GET /scene", &self.host());
         assert_eq!(status, 200, "{text}");
         serde_json::from_str(&text).expect("JSON")

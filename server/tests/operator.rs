@@ -76,6 +76,11 @@ impl Served {
         self.process.text()
     }
 
+    /// What was said behind these words.
+    pub(crate) fn word_after(&self, mark: &str) -> String {
+        self.process.word_after(mark)
+    }
+
     /// Whether there is a line with all of these.
     pub(crate) fn says(&self, parts: &[&str]) -> bool {
         self.lines_with(parts) > 0

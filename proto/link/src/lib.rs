@@ -30,9 +30,9 @@ pub mod transport;
 
 pub use client::{
     ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, GroupReceiver, LinkHealth,
-    LinkWatch, MESH_CACHE_BYTES, MeshCache, Provenance, ReceivedState, ReceivedWrench,
-    RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, ServerState, SessionEnd,
-    SupervisedLink, connect,
+    LinkWatch, MESH_CACHE_BYTES, MeshCache, PictureAsk, Provenance, ReceivedState, ReceivedWrench,
+    RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, ServerState, SessionEnd, Shown,
+    ShownPicture, SupervisedLink, connect,
 };
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters, MeshCounters};
@@ -46,7 +46,8 @@ pub use multicast::MulticastOptions;
 pub use server::{
     AlsoKey, Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FloodLimits,
     ForceInput, ForceOutput, FrameMaster, FrameReport, HEAD_READERS, HeadInput, HeadOutput,
-    LinkEvent, ServerLink, ServerOptions, serve,
+    LinkEvent, MAX_ASKED_BYTES, NodePicture, PICTURE_PATIENCE, PictureAnswer, PictureAsker,
+    ServerLink, ServerOptions, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{

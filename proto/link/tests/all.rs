@@ -9,6 +9,7 @@ mod intruders;
 mod membership;
 mod multicast;
 mod paths;
+mod pictures;
 mod refusals;
 mod release;
 mod roles;

@@ -13,7 +13,7 @@ use taut_link::{
 };
 use taut_proto::{
     Header, Kind, PROTOCOL_VERSION, VersionRange,
-    control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode, Transport},
+    control::{ControlMessage, Hello, LENGTH_BYTES, Offers, RefusalCode, Transport},
     header::{HEADER_BYTES, TAG_BYTES},
     limits::{JoinLimits, Rate},
     proof::{Claim, Grant},
@@ -195,6 +195,7 @@ fn hello(claim: Claim<'_>, proof: [u8; 32]) -> Hello {
         rate_hz: 0,
         proof,
         grant: claim.grant,
+        offers: Offers::NONE,
     }
 }
 

@@ -12,7 +12,7 @@ use taut_link::{
 };
 use taut_proto::{
     PROTOCOL_VERSION, VersionRange,
-    control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode, Transport},
+    control::{ControlMessage, Hello, LENGTH_BYTES, Offers, RefusalCode, Transport},
     proof::{Claim, Grant},
 };
 
@@ -77,6 +77,7 @@ fn hello() -> Vec<u8> {
         rate_hz: 0,
         proof: [0; 32],
         grant: Grant::Master,
+        offers: Offers::NONE,
     });
     must(hello.to_frame())
 }
@@ -272,6 +273,7 @@ async fn a_join_that_stalls_leaves_no_session_behind() {
         rate_hz: 0,
         proof: secret.client_proof(&bound, claim),
         grant: claim.grant,
+        offers: Offers::NONE,
     });
     let frame = hello.to_frame().unwrap_or_else(|error| fail(&error));
     let (mut send, _recv) = connection

@@ -4,8 +4,8 @@ use taut_proto::{
     ClientStats, ControlMessage, CouplingOffer, EventBatch, MeshHash, PROTOCOL_VERSION, Refusal,
     Role, Transport, VersionRange,
     control::{
-        ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, StatesBy,
-        Welcome,
+        ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, NoPicture, Offers,
+        PictureHeader, PictureRequest, RefusalCode, StatesBy, Welcome,
     },
     proof::Grant,
     stats::DrawnState,
@@ -30,6 +30,11 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         rate_hz: 1000,
         proof: [3; 32],
         grant: Grant::Master,
+        offers: Offers::NONE,
+    };
+    let offering = Hello {
+        offers: Offers::PICTURES,
+        ..hello.clone()
     };
     let granted = Hello {
         role: Role::Tracker,
@@ -115,6 +120,28 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
             ControlMessage::StatesBy(StatesBy {
                 multicast: true,
                 forged: false,
+            }),
+        ),
+        ("hello_with_pictures", ControlMessage::Hello(offering)),
+        (
+            "picture_request",
+            ControlMessage::PictureRequest(PictureRequest { longest_edge: 640 }),
+        ),
+        (
+            "picture_header",
+            ControlMessage::PictureHeader(PictureHeader {
+                screen: "wall-left".into(),
+                shown_ns: 2_000_000_000,
+                width: 640,
+                height: 360,
+                length: 70_000,
+                more: true,
+            }),
+        ),
+        (
+            "no_picture",
+            ControlMessage::NoPicture(NoPicture {
+                reason: "no frame was shown".into(),
             }),
         ),
     ]

@@ -1,5 +1,7 @@
 //! What one picture (window or image) needs on the graphics card, and pictures that are read back.
 
+use std::sync::mpsc::Sender;
+
 use super::anaglyph::Anaglyph;
 use super::chart::ChartDrawing;
 use super::gpu::Gpu;
@@ -108,6 +110,7 @@ pub struct OffScreen {
     texture: wgpu::Texture,
     view: wgpu::TextureView,
     readback: wgpu::Buffer,
+    format: wgpu::TextureFormat,
     size: (u32, u32),
     padded_row: u32,
 }
@@ -121,12 +124,24 @@ impl OffScreen {
         self.size
     }
 
+    /// Whether a picture of this format can be read: four bytes a pixel, red first or blue first.
+    pub(crate) fn can_read(format: wgpu::TextureFormat) -> bool {
+        matches!(format, Self::FORMAT | wgpu::TextureFormat::Bgra8UnormSrgb)
+    }
+
     /// An empty picture.
-    pub fn new(gpu: &Gpu, (width, height): (u32, u32)) -> Self {
-        let output = Output {
-            format: Self::FORMAT,
-            samples: 1,
-        };
+    pub fn new(gpu: &Gpu, size: (u32, u32)) -> Self {
+        Self::of_format(gpu, size, Self::FORMAT)
+    }
+
+    /// The same for a renderer of this format; see [`Self::can_read`].
+    pub(crate) fn of_format(
+        gpu: &Gpu,
+        (width, height): (u32, u32),
+        format: wgpu::TextureFormat,
+    ) -> Self {
+        debug_assert!(Self::can_read(format));
+        let output = Output { format, samples: 1 };
         let copied = wgpu::TextureUsages::COPY_SRC;
         let texture = attachment(&gpu.device, "picture", (width, height), output, copied);
         let padded_row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
@@ -135,6 +150,7 @@ impl OffScreen {
             view: texture.create_view(&Default::default()),
             readback: buffer(&gpu.device, "readback", bytes, wgpu::BufferUsages::MAP_READ),
             texture,
+            format,
             size: (width, height),
             padded_row,
         }
@@ -165,16 +181,40 @@ impl OffScreen {
 
     /// The picture of the last copy that was submitted; waits for it.
     pub fn read(&self, gpu: &Gpu) -> Result<image::RgbaImage, RenderError> {
+        let read = gpu.read(&self.readback).map(|rows| self.image(&rows))?;
+        self.readback.unmap();
+        read.ok_or_else(|| gpu.broken(&"a picture of the wrong size was read back"))
+    }
+
+    /// Asks for the last copy that was submitted; `done` hears whether it came, when the device is polled after that.
+    pub(crate) fn begin_read(&self, done: Sender<bool>) {
+        let mapped = move |result: Result<(), wgpu::BufferAsyncError>| {
+            let _ = done.send(result.is_ok()); // nobody listens any more
+        };
+        self.readback.map_async(wgpu::MapMode::Read, .., mapped);
+    }
+
+    /// The picture whose copy came; `None` if it did not.
+    pub(crate) fn take_read(&self) -> Option<image::RgbaImage> {
+        let read = self.readback.get_mapped_range(..).ok();
+        let image = read.and_then(|rows| self.image(&rows));
+        self.readback.unmap();
+        image
+    }
+
+    /// The picture of these rows.
+    fn image(&self, rows: &[u8]) -> Option<image::RgbaImage> {
         let (width, height) = self.size;
         let mut pixels = Vec::with_capacity(4 * width as usize * height as usize);
-        {
-            let rows = gpu.read(&self.readback)?;
-            for row in rows.chunks(self.padded_row as usize) {
-                pixels.extend_from_slice(&row[..4 * width as usize]);
-            }
+        for row in rows.chunks(self.padded_row as usize) {
+            pixels.extend_from_slice(row.get(..4 * width as usize)?);
         }
-        self.readback.unmap();
+        if self.format != Self::FORMAT {
+            // Blue first.
+            pixels
+                .chunks_exact_mut(4)
+                .for_each(|pixel| pixel.swap(0, 2));
+        }
         image::RgbaImage::from_raw(width, height, pixels)
-            .ok_or_else(|| gpu.broken(&"a picture of the wrong size was read back"))
     }
 }

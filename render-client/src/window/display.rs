@@ -14,10 +14,12 @@ use crate::canvas::target_of;
 use crate::error::RenderError;
 use crate::monitor::{self, Places};
 use crate::mouse;
-use crate::renderer::{Gpu, PictureTarget, Renderer, new_instance};
+use crate::renderer::{Gpu, OffScreen, PictureTarget, Renderer, new_instance};
+use crate::snapshot::{Frame, Part};
 use crate::stage::Stage;
 use crate::stereo::Picture;
 use crate::texture_limits::check_masks;
+use crate::view::Eyes;
 
 /// The windows and what draws in them.
 pub(super) struct Display {
@@ -149,6 +151,24 @@ impl Display {
         }
     }
 
+    /// The frame that was drawn last, for these eyes, and shown at `shown_ns`, to be drawn again.
+    pub(super) fn frame<'d>(
+        &'d self,
+        stage: &'d Stage,
+        eyes: &'d Eyes,
+        shown_ns: u64,
+    ) -> Frame<'d> {
+        let first = self.panes.first();
+        Frame {
+            gpu: &self.gpu,
+            renderer: &self.renderer,
+            stage,
+            eyes,
+            format: first.map_or(OffScreen::FORMAT, |pane| pane.format),
+            shown_ns,
+        }
+    }
+
     /// Draws another stage in the same windows.
     pub(super) fn restage(&mut self, stage: &Stage) -> Result<(), RenderError> {
         let Some(format) = self.panes.first().map(|pane| pane.format) else {
@@ -178,6 +198,16 @@ impl Display {
 }
 
 impl Pane {
+    /// Its picture, as it is shown.
+    pub(super) fn part(&self) -> Part<'_> {
+        Part {
+            screen: self.screen,
+            place: self.place,
+            picture: &self.picture,
+            size: (self.config.width, self.config.height),
+        }
+    }
+
     fn target_for(
         &self,
         gpu: &Gpu,

@@ -18,8 +18,12 @@ pub(crate) const TEXT: &str = "text/plain; charset=utf-8";
 pub(crate) const HTML: &str = "text/html; charset=utf-8";
 /// One JSON object a line.
 pub(crate) const JSON_LINES: &str = "application/x-ndjson";
+/// Pictures.
+pub(crate) const PNG: &str = "image/png";
+/// Bytes that are sent at a time: who takes none of them for [`SEND_TIME`] is given up, and who takes a few is not.
+const CHUNK_BYTES: usize = 64 << 10;
 /// What every answer says beside its own: nothing is kept, nothing is taken from elsewhere, no other page shows it in a frame.
-const COMMON_HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nContent-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; frame-ancestors 'none'\r\nReferrer-Policy: no-referrer\r\nConnection: close\r\n";
+const COMMON_HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nContent-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; img-src blob:; frame-ancestors 'none'\r\nReferrer-Policy: no-referrer\r\nConnection: close\r\n";
 
 /// Why a connection ended.
 #[derive(Debug)]
@@ -78,11 +82,13 @@ pub(crate) async fn answer(
     stream: &mut TcpStream,
     status: &str,
     kind: &str,
-    body: &str,
+    body: impl AsRef<[u8]>,
 ) -> Result<(), End> {
     let head = head(status, kind);
     send(stream.write_all(head.as_bytes())).await?;
-    send(stream.write_all(body.as_bytes())).await?;
+    for chunk in body.as_ref().chunks(CHUNK_BYTES) {
+        send(stream.write_all(chunk)).await?;
+    }
     send(stream.shutdown()).await
 }
 

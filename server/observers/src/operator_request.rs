@@ -34,6 +34,10 @@ pub(crate) enum Call {
     Token,
     /// The scene changed, as the body says.
     Edit(Body),
+    /// Pictures of what the render nodes show.
+    Pictures,
+    /// One of these, by its number.
+    Picture(u64),
     /// Something done.
     Act(Deed),
 }
@@ -85,7 +89,7 @@ impl Refusal {
             ),
             Self::NotFound => (
                 "404 Not Found",
-                "there are /, /status, /stream and /scene to look, /arm, /disarm, /edit and /token to act",
+                "there are /, /status, /stream and /scene to look, /arm, /disarm, /edit, /pictures, /picture/NUMBER and /token to act",
             ),
             Self::LookByGet => (NOT_ALLOWED, "looking is by GET"),
             Self::ActByPost => (NOT_ALLOWED, "acting is by POST"),
@@ -149,14 +153,16 @@ fn judge(request: &httparse::Request<'_, '_>, begins: usize, token: &str) -> Res
         "/edit" => Call::Edit(Body { begins, length: 0 }),
         "/arm" => Call::Act(Deed::Arm),
         "/disarm" => Call::Act(Deed::Disarm),
-        _ => return Err(Refusal::NotFound),
+        "/pictures" => Call::Pictures,
+        _ => Call::Picture(picture_number(path).ok_or(Refusal::NotFound)?),
     };
     match call {
         Call::Page | Call::Status | Call::Lines | Call::Scene => match request.method {
             Some("GET") => Ok(call),
             _ => Err(Refusal::LookByGet),
         },
-        Call::Token | Call::Act(_) | Call::Edit(_) => {
+        // What is on the screens is shown to nobody who could not change it.
+        Call::Token | Call::Act(_) | Call::Edit(_) | Call::Pictures | Call::Picture(_) => {
             if request.method != Some("POST") {
                 return Err(Refusal::ActByPost);
             }
@@ -175,6 +181,12 @@ fn judge(request: &httparse::Request<'_, '_>, begins: usize, token: &str) -> Res
             }
         }
     }
+}
+
+fn picture_number(path: &str) -> Option<u64> {
+    let digits = path.strip_prefix("/picture/")?;
+    let is_number = digits.bytes().all(|byte| byte.is_ascii_digit());
+    is_number.then(|| digits.parse().ok()).flatten()
 }
 
 fn body_length(request: &httparse::Request<'_, '_>) -> Result<usize, Refusal> {
@@ -215,6 +227,8 @@ mod tests {
             ("POST /arm", Call::Act(Deed::Arm)),
             ("POST /disarm", Call::Act(Deed::Disarm)),
             ("POST /token", Call::Token),
+            ("POST /pictures", Call::Pictures),
+            ("POST /picture/17", Call::Picture(17)),
         ] {
             assert_eq!(ask(line, &own), Ok(call));
             assert_eq!(ask(line, &format!("{HERE}{SHOWN}")), Ok(call), "a program");
@@ -241,6 +255,10 @@ mod tests {
         }
         assert_eq!(ask("POST /stream", &shown), Err(Refusal::LookByGet));
         assert_eq!(ask("POST /favicon.ico", &shown), Err(Refusal::NotFound));
+        for number in ["", "-1", "+1", "1/2", "x", "99999999999999999999"] {
+            let refused = ask(&format!("POST /picture/{number}"), &shown);
+            assert_eq!(refused, Err(Refusal::NotFound), "{number}");
+        }
         for headers in [
             format!("{shown}Origin: http://evil.example\r\n"),
             format!("{shown}Origin: http://127.0.0.1:4860\r\n"),
@@ -248,7 +266,14 @@ mod tests {
             format!("{shown}Sec-Fetch-Site: cross-site\r\nSec-Fetch-Dest: image\r\n"),
             format!("Host: rebound.example:4861\r\n{SHOWN}"),
         ] {
-            for line in ["POST /arm", "POST /disarm", "POST /token", "GET /stream"] {
+            for line in [
+                "POST /arm",
+                "POST /disarm",
+                "POST /token",
+                "POST /pictures",
+                "POST /picture/1",
+                "GET /stream",
+            ] {
                 assert_eq!(ask(line, &headers), Err(Refusal::Foreign), "{headers}");
             }
         }

@@ -8,6 +8,8 @@
 //! | `/arm`, `/disarm` | POST | asks for force, or for none; answered when the device port has | the guard and the token |
 //! | `/scene` | GET | the scene that runs | the guard |
 //! | `/edit` | POST | changes the scene as the body says; answered when that is taken or refused | the guard and the token |
+//! | `/pictures` | POST | asks the render nodes for pictures of what they show; answered with a list of them, JSON | the same |
+//! | `/picture/NUMBER` | POST | one of these, a PNG | the same |
 //! | `/token` | POST | says whether the token is right | the same |
 //!
 //! A deed is done by this thread as soon as its request is whole: no queue and no other thread is between it and the [`Desk`].
@@ -25,7 +27,7 @@ use tokio::sync::{Semaphore, watch};
 use tokio::time::{Instant, sleep, timeout};
 
 use crate::asking::{Asking, Entrance, REQUEST_TIME};
-use crate::http::{End, HTML, JSON_LINES, Lines, TEXT, answer, body, head, request, send};
+use crate::http::{End, HTML, JSON_LINES, Lines, PNG, TEXT, answer, body, head, request, send};
 use crate::operator_request::{Call, Deed, Refusal, read};
 use crate::service::{ACCEPT_PAUSE, Service, listen, runtime};
 
@@ -37,6 +39,8 @@ const MAX_VIEWERS: usize = 16;
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Longest that a changed scene is waited for: its meshes are read and checked.
 const EDIT_PATIENCE: Duration = Duration::from_secs(120);
+/// Longest that pictures are waited for: longer than a node is.
+const PICTURES_PATIENCE: Duration = Duration::from_secs(20);
 /// Time between two looks at what it did.
 const LOOK_PERIOD: Duration = Duration::from_millis(5);
 /// A deed was not done.
@@ -50,6 +54,16 @@ const NO_ANSWER: (&str, &str) = (
 const NOT_YET_TAKEN: (&str, &str) = (
     "504 Gateway Timeout",
     "the scene is being read still; look at the server's log for what comes of it",
+);
+/// The same of pictures.
+const NO_PICTURES: (&str, &str) = (
+    "504 Gateway Timeout",
+    "asked, but the pictures are not there yet; look at the server's log",
+);
+/// A picture of before.
+const GONE: (&str, &str) = (
+    "404 Not Found",
+    "there is no such picture any more: ask for new ones",
 );
 /// Before the first status line.
 const NOTHING_MEASURED: (&str, &str) = (
@@ -78,6 +92,15 @@ pub trait Desk: Send + Sync + 'static {
     /// # Errors
     /// A sentence: why it is not even tried.
     fn edit(&self, body: &[u8], peer: SocketAddr) -> Result<Outcome, String>;
+
+    /// Asks the render nodes for pictures of what they show, for whoever has shown the token from `peer`; comes to the list of them, JSON.
+    ///
+    /// # Errors
+    /// A sentence: why they are not even asked.
+    fn pictures(&self, peer: SocketAddr) -> Result<Outcome, String>;
+
+    /// The picture of this number, a PNG; `None` where it is gone.
+    fn picture(&self, number: u64) -> Option<Arc<[u8]>>;
 
     /// The scene that runs, a JSON object.
     fn scene(&self) -> Arc<str>;
@@ -184,14 +207,34 @@ async fn accept(listener: TcpListener, shared: Shared) {
     }
 }
 
+/// How something is waited for that may take long.
+struct Patience {
+    longest: Duration,
+    /// Told where it takes longer.
+    silent: (&'static str, &'static str),
+    /// Of a good answer.
+    kind: &'static str,
+}
+
+const EDITING: Patience = Patience {
+    longest: EDIT_PATIENCE,
+    silent: NOT_YET_TAKEN,
+    kind: TEXT,
+};
+const PICTURING: Patience = Patience {
+    longest: PICTURES_PATIENCE,
+    silent: NO_PICTURES,
+    kind: JSON_LINES,
+};
+
 /// What came of a request's head.
 enum Heard {
     /// Somebody looks at something.
     Look(Call),
     /// A deed was done; what to look at for its answer.
     Done(Outcome),
-    /// The same of a change of the scene.
-    Edited(Outcome),
+    /// The same of what may take long: how long it may, what is said where it took longer, and what kind of answer it is.
+    Slow(Outcome, Patience),
     /// A deed was not done.
     NotDone(String),
     /// Nothing is given.
@@ -220,11 +263,14 @@ async fn serve(
             }
             Err(_) => Heard::Refused(Refusal::Full),
         },
-        // It may take long, and who has shown the token is not crowded out by others; the desk bounds their number.
-        Heard::Edited(outcome) => {
+        // Who has shown the token is not crowded out by others; the desk bounds their number.
+        Heard::Slow(outcome, patience) => {
             drop(asking);
-            let (status, text) = answer_to(come_of(outcome, EDIT_PATIENCE).await, NOT_YET_TAKEN);
-            return answer(&mut stream, status, TEXT, &format!("{text}\n")).await;
+            let came = come_of(outcome, patience.longest).await;
+            let kind = came.as_ref().is_some_and(Result::is_ok);
+            let kind = if kind { patience.kind } else { TEXT };
+            let (status, text) = answer_to(came, patience.silent);
+            return answer(&mut stream, status, kind, &format!("{text}\n")).await;
         }
         heard => heard,
     };
@@ -249,10 +295,14 @@ async fn hear(stream: &mut TcpStream, peer: SocketAddr, shared: &Shared) -> Resu
             let reading = timeout(REQUEST_TIME, body(stream, came, place.length)).await;
             let body = reading.map_err(|_| End::Gone)??;
             match shared.desk.edit(&body, peer) {
-                Ok(outcome) => Heard::Edited(outcome),
+                Ok(outcome) => Heard::Slow(outcome, EDITING),
                 Err(why) => Heard::NotDone(why),
             }
         }
+        Ok(Call::Pictures) => match shared.desk.pictures(peer) {
+            Ok(outcome) => Heard::Slow(outcome, PICTURING),
+            Err(why) => Heard::NotDone(why),
+        },
         Ok(Call::Act(deed)) => match shared.desk.act(deed, peer) {
             Ok(outcome) => Heard::Done(outcome),
             Err(why) => Heard::NotDone(why),
@@ -282,9 +332,13 @@ async fn answer_once(stream: &mut TcpStream, heard: Heard, shared: &Shared) -> R
             let scene = shared.desk.scene();
             return answer(stream, "200 OK", JSON_LINES, &format!("{scene}\n")).await;
         }
+        Heard::Look(Call::Picture(number)) => match shared.desk.picture(number) {
+            Some(png) => return answer(stream, "200 OK", PNG, &png).await,
+            None => GONE,
+        },
         Heard::Look(Call::Token) => ("200 OK", "the token is right"),
         Heard::Look(_) => return answer(stream, "200 OK", HTML, PAGE).await,
-        Heard::Done(outcome) | Heard::Edited(outcome) => {
+        Heard::Done(outcome) | Heard::Slow(outcome, _) => {
             let (status, text) = answer_to(come_of(outcome, PATIENCE).await, NO_ANSWER);
             return answer(stream, status, TEXT, &format!("{text}\n")).await;
         }

@@ -274,7 +274,7 @@ async fn answer_at_once(
         Ok(Wish::Metrics) => {
             let text = shared.metrics.borrow().clone();
             match text {
-                Some(text) => answer(stream, "200 OK", METRICS_KIND, &text).await,
+                Some(text) => answer(stream, "200 OK", METRICS_KIND, &*text).await,
                 None => {
                     let (status, why) = NOTHING_MEASURED;
                     answer(stream, status, TEXT, why).await

@@ -6,6 +6,8 @@ use std::path::Path;
 /// 1 kHz. It grows with the rows of the constraint sets. `docs/recordings.md` has the command.
 const AN_HOUR: [f64; 2] = [4.8e9, 6.7e9];
 const GIGABYTE: f64 = 1e9;
+/// Free space without which no recording is begun while a session runs, bytes: some nine minutes.
+const LEAST_ROOM: f64 = 1e9;
 
 /// Where the recording goes, how fast it grows, and for how long there is room.
 pub(super) fn sentence(directory: &Path) -> String {
@@ -14,17 +16,38 @@ pub(super) fn sentence(directory: &Path) -> String {
         "recording to {}: {least:.0} to {most:.0} GB an hour with few contacts, more with many",
         directory.display()
     );
-    match rustix::fs::statvfs(directory) {
-        Ok(disk) => {
-            let free = disk.f_bavail as f64 * disk.f_frsize as f64;
+    match free(directory) {
+        Some(free) => {
             let hours = free / AN_HOUR[1];
             format!(
                 "{growth}; {:.0} GB are free there, enough for {hours:.1} hours",
                 free / GIGABYTE
             )
         }
-        Err(_) => growth, // the free space is not known on every file system
+        None => growth,
     }
+}
+
+/// Refuses a disk with less than a gigabyte.
+///
+/// # Errors
+/// A sentence.
+pub(super) fn check_room(directory: &Path) -> Result<(), String> {
+    match free(directory) {
+        Some(free) if free < LEAST_ROOM => Err(format!(
+            "{:.1} GB are free at {}, and an hour of recording takes {:.0} GB or more; make room, or name another disk",
+            free / GIGABYTE,
+            directory.display(),
+            AN_HOUR[0] / GIGABYTE
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Free space, bytes; it is not known on every file system.
+fn free(directory: &Path) -> Option<f64> {
+    let disk = rustix::fs::statvfs(directory).ok()?;
+    Some(disk.f_bavail as f64 * disk.f_frsize as f64)
 }
 
 #[cfg(test)]

@@ -270,6 +270,12 @@ impl PageAudit {
         tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node, role = %Role::Operator, credential = "the page's token", %address);
     }
 
+    /// Somebody who has shown the token asked for pictures of the screens.
+    pub(crate) fn saw(&self, address: SocketAddr) {
+        let node = self.node;
+        tracing::info!(target: taut_log::AUDIT_TARGET, event = "pictures", node, role = %Role::Operator, credential = "the page's token", %address);
+    }
+
     /// Somebody who has shown the token changed the scene.
     pub(crate) fn edited(address: SocketAddr, revision: u64, what: &str) {
         let node = super::operator::NODE;

@@ -142,6 +142,7 @@ impl Session {
                 &loops.statistics,
                 clock,
                 &policy,
+                link.picture_asker(runtime.handle().clone()),
             )?),
             _ => {
                 kept.close();

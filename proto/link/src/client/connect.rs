@@ -7,6 +7,7 @@ use super::{
     inbound::Inbound,
     link::AtJoin,
     meshes::Meshes,
+    pictures::{self, PictureSlot},
 };
 use crate::{
     DEFAULT_QUIC_PORT, LinkError, binding,
@@ -28,7 +29,7 @@ use std::{
 };
 use taut_proto::{
     Act, CouplingOffer, DecodeError, Refusal, SceneDescription, Transport, VersionRange,
-    control::{ControlMessage, Hello, MAX_FRAME_BYTES, RefusalCode, Welcome},
+    control::{ControlMessage, Hello, MAX_FRAME_BYTES, Offers, RefusalCode, Welcome},
     proof::Claim,
 };
 use tokio::time::{Instant, sleep_until, timeout, timeout_at};
@@ -104,6 +105,11 @@ pub(crate) async fn connect_with(
     ));
     hot.clone().start()?;
     tokio::spawn(control::listen(hot.clone(), recv, options.rate_hz == 0));
+    let pictures = PictureSlot::default();
+    if options.pictures {
+        let connection = hot.connection.clone();
+        tokio::spawn(pictures::listen(connection, hot.version, pictures.clone()));
+    }
     meshes.keep_only(&description);
     Ok(ClientLink::new(
         options.server,
@@ -122,6 +128,7 @@ pub(crate) async fn connect_with(
             coupling,
         },
         meshes,
+        pictures,
         send,
     ))
 }
@@ -281,6 +288,10 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         rate_hz: options.rate_hz,
         proof: secret.client_proof(&binding, claim),
         grant,
+        offers: match options.pictures {
+            true => Offers::PICTURES,
+            false => Offers::NONE,
+        },
     };
     let welcome = greet(options, connection, hello, (&mut send, &mut recv)).await?;
     // Now the server must prove the secret, too: its certificate alone says only that it holds its own key.

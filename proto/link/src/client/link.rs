@@ -1,7 +1,8 @@
 //! A joined session: scene, meshes, states, device input and reports.
 
 use super::{
-    FrameGate, GroupReceiver, ReceivedState, ReceivedWrench, Roster, hot::Hot, meshes::Meshes,
+    FrameGate, GroupReceiver, PictureAsk, ReceivedState, ReceivedWrench, Roster, hot::Hot,
+    inbound::lock, meshes::Meshes, pictures::PictureSlot,
 };
 use crate::{
     CHANGE_REASON, ClientCounters, LinkError, MeshCounters, STOP_REASON,
@@ -52,6 +53,7 @@ pub struct ClientLink {
     description: SceneDescription,
     coupling: Option<CouplingOffer>,
     meshes: Arc<Meshes>,
+    pictures: PictureSlot,
     outbox: mpsc::Sender<ControlMessage>,
 }
 
@@ -73,6 +75,7 @@ impl ClientLink {
         hot: Arc<Hot>,
         joined: AtJoin,
         meshes: Arc<Meshes>,
+        pictures: PictureSlot,
         send: SendStream,
     ) -> ClientLink {
         let (outbox, messages) = mpsc::channel(MAX_WAITING_MESSAGES);
@@ -88,6 +91,7 @@ impl ClientLink {
             description: joined.description,
             coupling: joined.coupling,
             meshes,
+            pictures,
             outbox,
         }
     }
@@ -169,6 +173,16 @@ impl ClientLink {
     /// two frames that this node is made for; the slowest node's is everybody's. There is one gate at a time: a second one takes over.
     pub fn frame_gate(&self, period: Duration) -> FrameGate {
         FrameGate::new(self.hot.clone(), self.session, period, self.node_timeout)
+    }
+
+    /// Whether the server wants pictures of what this node shows: [`ClientLink::take_picture_ask`] has the question.
+    pub fn is_picture_asked(&self) -> bool {
+        lock(&self.pictures).is_some()
+    }
+
+    /// The server's question for pictures of what this node shows, if there is one, and [`super::ClientOptions::pictures`] was set. One at a time.
+    pub fn take_picture_ask(&self) -> Option<PictureAsk> {
+        lock(&self.pictures).take()
     }
 
     /// Moves the discrete events since the last call to the end of `out`: each since the join exactly once, in order, whatever the network loses. At most

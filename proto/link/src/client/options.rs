@@ -38,6 +38,8 @@ pub struct ClientOptions {
     /// Real-time priority, 1 to 99, of the thread that receives, of the one that leads frames, and of the one that draws while it waits for its frame.
     /// Where the system does not grant it, and with `None`, they have the class of the thread that made them.
     pub priority: Option<u8>,
+    /// Whether it gives pictures of what it shows when it is asked for them: [`super::ClientLink::take_picture_ask`].
+    pub pictures: bool,
 }
 
 impl ClientOptions {
@@ -60,6 +62,7 @@ impl ClientOptions {
             idle_timeout: LONGEST_IDLE,
             mesh_cache: None,
             priority: None,
+            pictures: false,
         }
     }
 }

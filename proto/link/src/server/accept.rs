@@ -255,6 +255,7 @@ fn admit(
                 version,
                 is_newest: version == shared.versions.max(),
                 by_also_key,
+                offers: hello.offers,
             };
             Ok(Session::new(admitted, connection.clone(), keys))
         })?;

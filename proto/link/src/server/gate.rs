@@ -27,7 +27,7 @@ pub(crate) fn act_of_datagram(payload: &Payload) -> Option<Act> {
     }
 }
 
-/// What a client does by a message on its control stream; `None` for what belongs to joining, to a mesh's stream, or to a server. A goodbye
+/// What a client does by a message on its control stream; `None` for what belongs to joining, to a stream of its own, or to a server. A goodbye
 /// needs no right.
 pub(crate) fn act_of_message(message: &ControlMessage) -> Option<Act> {
     match message {
@@ -43,7 +43,10 @@ pub(crate) fn act_of_message(message: &ControlMessage) -> Option<Act> {
         | ControlMessage::Group(_)
         | ControlMessage::Events(_)
         | ControlMessage::MeshRequest(_)
-        | ControlMessage::MeshHeader(_) => None,
+        | ControlMessage::MeshHeader(_)
+        | ControlMessage::PictureRequest(_)
+        | ControlMessage::PictureHeader(_)
+        | ControlMessage::NoPicture(_) => None,
     }
 }
 

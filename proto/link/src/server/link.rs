@@ -2,7 +2,7 @@
 
 use super::{
     Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, ForceOutput, FrameMaster,
-    FrameReport, HEAD_READERS, HeadOutput, LinkEvent, ServerOptions, accept,
+    FrameReport, HEAD_READERS, HeadOutput, LinkEvent, PictureAsker, ServerOptions, accept,
     device_input::InputWriter,
     device_receiver::DevicePaths,
     events::EventHub,
@@ -224,6 +224,11 @@ impl ServerLink {
     /// How the frames of the render nodes went; `None` where they are not locked.
     pub fn frame_report(&self) -> Option<FrameReport> {
         self.shared.frames.as_ref().map(Frames::report)
+    }
+
+    /// Asks the render nodes for pictures of what they show, by tasks on `runtime`.
+    pub fn picture_asker(&self, runtime: tokio::runtime::Handle) -> PictureAsker {
+        PictureAsker::new(&self.shared, runtime)
     }
 
     /// Newest device reading, for the haptics loop. There is one: the first call takes it, later ones get `None`.

@@ -11,7 +11,7 @@ use std::{
 };
 use taut_proto::{
     ClientStats, Kind, Payload, Role, Transport,
-    control::StatesBy,
+    control::{Offers, StatesBy},
     events::is_newer,
     group::is_member,
     pace::Pace,
@@ -32,6 +32,8 @@ pub(crate) struct Session {
     is_newest: bool,
     /// Whether it proved a secret of the second cluster key.
     pub(crate) by_also_key: bool,
+    /// What it does beside what every client of its role does.
+    pub(crate) offers: Offers,
     pub(crate) connection: quinn::Connection,
     /// Where the control plane came from at join.
     control: SocketAddr,
@@ -83,6 +85,7 @@ pub(crate) struct Admitted {
     pub(crate) version: u8,
     pub(crate) is_newest: bool,
     pub(crate) by_also_key: bool,
+    pub(crate) offers: Offers,
 }
 
 impl Session {
@@ -101,6 +104,7 @@ impl Session {
             version: admitted.version,
             is_newest: admitted.is_newest,
             by_also_key: admitted.by_also_key,
+            offers: admitted.offers,
             control: connection.remote_address(),
             connection,
             joined_ns: admitted.joined_ns,

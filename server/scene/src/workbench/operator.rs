@@ -21,6 +21,8 @@ pub struct Operator {
     pub token_file: Option<PathBuf>,
     /// Scenes that may be chosen from the page: shipped ones by name, else files.
     pub scenes: Vec<String>,
+    /// Folder of the recordings that are begun from the page, each a folder named by its date; without it none is begun there.
+    pub recordings: Option<PathBuf>,
 }
 
 impl Default for Operator {
@@ -30,6 +32,7 @@ impl Default for Operator {
             port: 4861,
             token_file: None,
             scenes: Vec::new(),
+            recordings: None,
         }
     }
 }
@@ -52,6 +55,7 @@ pub(super) fn operator(section: &Section<'_>, files: &Files<'_>) -> Operator {
         port: port(section, "port", default.port),
         token_file: files.path(section, "token_file"),
         scenes: scenes(section, files),
+        recordings: files.path(section, "recordings"),
     }
 }
 

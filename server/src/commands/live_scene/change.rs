@@ -1,11 +1,13 @@
 //! What an operator's wish comes to: read, checked, and put together as the next session, on a thread of its own.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use taut_scene::{EditedKey, FinishedFile, Scene};
 
 use super::load::{Loader, Next};
+use super::recordings;
+use crate::commands::recording_size;
 use crate::session::Session;
 use crate::session::operator::SceneWish;
 use crate::shared::failure::Failure;
@@ -23,6 +25,10 @@ pub(super) struct Wanted {
     pub(super) not_kept: Vec<String>,
     /// What can be chosen.
     pub(super) scenes: Vec<String>,
+    /// Where recordings go.
+    pub(super) recordings: Option<PathBuf>,
+    /// Where the session is recorded that runs.
+    pub(super) recording: Option<PathBuf>,
     pub(super) wish: SceneWish,
 }
 
@@ -33,11 +39,16 @@ pub(super) struct Change {
     pub(super) what: String,
     /// The file is to have it.
     pub(super) keep: bool,
+    /// It is the same scene: a recording begins or ends.
+    pub(super) is_recording: bool,
 }
 
 impl Wanted {
     /// Everything that can be wrong is found here; nothing is opened and nothing written. `None`: it runs so already, and the file is to have it.
     pub(super) fn make(self) -> Result<Option<Change>, Failure> {
+        if let Some(on) = self.wish.recording {
+            return self.recorded(on).map(Some);
+        }
         let keep = self.wish.keep;
         let made = match &self.wish.scene {
             Some(named) => Some(self.another(named)?),
@@ -50,7 +61,60 @@ impl Wanted {
             next.not_kept.clear();
         }
         Session::begin(&mut next.setup)?;
-        Ok(Some(Change { next, what, keep }))
+        Ok(Some(Change {
+            next,
+            what,
+            keep,
+            is_recording: false,
+        }))
+    }
+
+    /// The scene that runs, recorded or not.
+    fn recorded(&self, on: bool) -> Result<Change, Failure> {
+        if self.wish.scene.is_some() || !self.wish.edits.is_empty() || self.wish.keep {
+            return Err(Failure::bad_input(
+                "a recording is of the scene as it runs; change that first, or afterwards",
+            ));
+        }
+        let (directory, what) = match (&self.recording, on, &self.recordings) {
+            (Some(recording), true, _) => {
+                return Err(Failure::BadInput(format!(
+                    "the session is recorded to {} already",
+                    recording.display()
+                )));
+            }
+            (None, false, _) => return Err(Failure::bad_input("the session is not recorded")),
+            (Some(recording), false, _) => (
+                None,
+                format!("the recording to {} ends", recording.display()),
+            ),
+            (None, true, None) => {
+                return Err(Failure::bad_input("there is no folder for recordings"));
+            }
+            (None, true, Some(recordings)) => {
+                let directory = recordings::place(recordings);
+                (Some(directory), String::new())
+            }
+        };
+        let loader = self.loader.recorded_to(directory.clone());
+        let mut next = loader.change(&self.from, self.scene.clone())?;
+        next.in_file = self.in_file.clone();
+        next.not_kept = self.not_kept.clone();
+        next.goes_on = !on; // a recording begins at the scene's start
+        Session::begin(&mut next.setup)?;
+        let what = match directory {
+            Some(directory) => {
+                recordings::make(&directory)?; // last: what is refused leaves nothing behind
+                recording_size::sentence(&directory)
+            }
+            None => what,
+        };
+        Ok(Change {
+            next,
+            what,
+            keep: false,
+            is_recording: true,
+        })
     }
 
     /// The scene that runs, with some keys set; `None` as for [`Wanted::make`].

@@ -1,6 +1,7 @@
 //! From the files to what a session is made of: at the start, and again when they are others.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use taut_link::ClusterKey;
@@ -62,6 +63,13 @@ impl Loader {
         self.overrides.prepared = Some(setup.prepared.clone());
         let page = setup.operator.as_ref();
         self.token = page.map(|page| page.server.token.clone());
+    }
+
+    /// The same with a recording, or without.
+    pub(super) fn recorded_to(&self, directory: Option<PathBuf>) -> Self {
+        let mut other = self.clone();
+        other.overrides.recording = directory;
+        other
     }
 
     /// Where whoever comes again comes to.
@@ -150,16 +158,15 @@ pub(in crate::commands) fn load_workbench(args: &ServeArgs) -> Result<Workbench,
     if let Some(scene) = &args.scene {
         workbench.scene.clone_from(scene);
     }
-    refuse_to_follow(args, &workbench)?;
+    if args.follow_scene {
+        refuse_to_follow(&workbench)?;
+    }
     Ok(workbench)
 }
 
 /// What a session that is followed by another cannot have: a file that is of one session, or a force device, which can be opened once and
 /// would be opened before the session before ends.
-fn refuse_to_follow(args: &ServeArgs, workbench: &Workbench) -> Result<(), Failure> {
-    if !args.follow_scene {
-        return Ok(());
-    }
+pub(in crate::commands) fn refuse_to_follow(workbench: &Workbench) -> Result<(), Failure> {
     if workbench.monitoring.record.is_some() {
         return Err(Failure::bad_input(
             "--follow-scene begins a session for each scene, and the file of [monitoring] record is of one; take record out, or serve without --follow-scene",

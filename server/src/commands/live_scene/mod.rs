@@ -9,17 +9,19 @@ mod change;
 mod files;
 mod load;
 mod pending;
+mod recordings;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use taut_scene::{Device, Scene, Workbench, shipped_scene_text};
+use taut_scene::{Scene, Workbench, shipped_scene_text};
 
 use self::change::{Change, Wanted, write_scene};
 use self::files::SceneWatch;
 use self::load::Loader;
-pub(super) use self::load::{Next, load_workbench};
+pub(super) use self::load::{Next, load_workbench, refuse_to_follow};
 use self::pending::{Pending, joined};
 use crate::cli::ServeArgs;
 use crate::report::terminal::Terminal;
@@ -41,6 +43,7 @@ struct Taken {
     asked: AskedScene,
     what: String,
     warnings: Vec<String>,
+    is_recording: bool,
 }
 
 /// The scene that runs.
@@ -55,6 +58,11 @@ struct Running {
     /// What can be chosen.
     scenes: Vec<String>,
     why_closed: Option<&'static str>,
+    /// Where recordings go that are begun from the page.
+    recordings: Option<PathBuf>,
+    /// Where it is recorded.
+    recording: Option<PathBuf>,
+    why_not_recorded: Option<&'static str>,
     /// What can be changed, a JSON object.
     objects: String,
 }
@@ -120,7 +128,14 @@ impl LiveScene {
             in_file: next.in_file.clone(),
             not_kept: std::mem::take(&mut next.not_kept),
             scenes,
-            why_closed: why_closed(&next.workbench, setup),
+            why_closed: self.why_closed(&next.workbench, setup),
+            recordings: next.workbench.operator.recordings.clone(),
+            recording: setup.recording.as_ref().map(|r| r.directory.clone()),
+            why_not_recorded: recordings::why_not(
+                &next.workbench,
+                setup,
+                self.is_recorded_from_start(),
+            ),
             objects: objects_of(setup),
         });
         self.show();
@@ -131,6 +146,10 @@ impl LiveScene {
         let Some(running) = &self.running else {
             return;
         };
+        let recording = running
+            .recording
+            .as_ref()
+            .map(|at| at.display().to_string());
         let standing = Standing {
             revision: self.revision,
             name: running.scene.name(),
@@ -139,6 +158,8 @@ impl LiveScene {
             not_kept: &running.not_kept,
             why_closed: running.why_closed,
             why_not_kept: running.why_not_kept(),
+            recording: recording.as_deref(),
+            why_not_recorded: running.why_not_recorded,
         };
         self.desk.show(&standing, &running.objects);
     }
@@ -151,6 +172,7 @@ impl LiveScene {
             asked,
             what,
             mut warnings,
+            is_recording,
         }) = self.taken.take()
         else {
             return;
@@ -159,6 +181,9 @@ impl LiveScene {
             warnings.push(where_it_is);
         }
         PageAudit::edited(asked.peer, self.revision, &what);
+        if is_recording {
+            return asked.answer(Ok(format!("{what}; revision {} runs", self.revision)));
+        }
         let running = self.running.as_ref();
         let in_file = if running.is_some_and(|running| running.not_kept.is_empty()) {
             "the file has it"
@@ -215,6 +240,12 @@ impl LiveScene {
         let (files, running) = (self.files.as_ref()?, self.running.as_ref()?);
         let mut next = files.take(terminal, joined(thread))?;
         next.goes_on = next.workbench.scene == running.from;
+        if let Some(recording) = running.recording.as_ref() {
+            terminal.say(&format!(
+                "the recording to {} ends with the scene that it is of; begin another from the operator's page",
+                recording.display()
+            ));
+        }
         self.gone.clone_from(&running.not_kept);
         if !self.gone.is_empty() {
             terminal.say(&format!(
@@ -231,7 +262,7 @@ impl LiveScene {
             return;
         };
         let wish = asked.wish.clone();
-        if wish.scene.is_none() && wish.edits.is_empty() {
+        if wish.recording.is_none() && wish.scene.is_none() && wish.edits.is_empty() {
             let kept = if wish.keep {
                 self.keep_as_it_runs(&asked)
             } else {
@@ -239,7 +270,8 @@ impl LiveScene {
             };
             return asked.answer(kept.map_err(|why| format!("not kept: {why}")));
         }
-        if let (true, None, Some(why)) = (wish.keep, &wish.scene, running.why_not_kept()) {
+        let keeps = wish.keep && wish.recording.is_none();
+        if let (true, None, Some(why)) = (keeps, &wish.scene, running.why_not_kept()) {
             return asked.answer(Err(format!("not taken, since it cannot be kept: {why}")));
         }
         let wanted = Wanted {
@@ -249,6 +281,8 @@ impl LiveScene {
             in_file: running.in_file.clone(),
             not_kept: running.not_kept.clone(),
             scenes: running.scenes.clone(),
+            recordings: running.recordings.clone(),
+            recording: running.recording.clone(),
             wish,
         };
         match pending::make(wanted) {
@@ -308,8 +342,13 @@ impl LiveScene {
         });
         match written {
             Ok(change) => {
+                let does = if change.is_recording {
+                    "begins or ends a recording"
+                } else {
+                    "changes the scene"
+                };
                 terminal.say(&format!(
-                    "an operator changes the scene ({}): the force fades, and another session begins",
+                    "an operator {does} ({}): the force fades, and another session begins",
                     change.what
                 ));
                 let mut next = change.next;
@@ -320,6 +359,7 @@ impl LiveScene {
                 self.taken = Some(Taken {
                     asked,
                     what: change.what,
+                    is_recording: change.is_recording,
                     warnings: next.setup.warnings.clone(),
                 });
                 Some(next)
@@ -329,6 +369,25 @@ impl LiveScene {
                 None
             }
         }
+    }
+
+    /// Whether the command line has every session recorded.
+    fn is_recorded_from_start(&self) -> bool {
+        self.loader.args.recording.is_some()
+    }
+
+    /// Why nobody changes the scene of this session.
+    fn why_closed(&self, workbench: &Workbench, setup: &SessionSetup) -> Option<&'static str> {
+        let monitor = setup.monitor.as_ref();
+        if setup.recording.is_some() && !self.is_recorded_from_start() {
+            return Some(
+                "the session is recorded, and a recording is of one scene; end the recording first",
+            );
+        }
+        if setup.recording.is_some() || monitor.is_some_and(|m| m.record.is_some()) {
+            return Some("the session is recorded, and a recording is of one scene; serve without");
+        }
+        recordings::is_opened_once(workbench).then_some(recordings::OPENED_ONCE)
     }
 
     /// Gives the file of a scene that is about to run what it runs with.
@@ -347,19 +406,5 @@ impl LiveScene {
             None => self.wrote(file),
         }
         Ok(())
-    }
-}
-
-/// Why nobody changes the scene of this session.
-fn why_closed(workbench: &Workbench, setup: &SessionSetup) -> Option<&'static str> {
-    let monitor = setup.monitor.as_ref();
-    if setup.recording.is_some() || monitor.is_some_and(|m| m.record.is_some()) {
-        return Some("the session is recorded, and a recording is of one scene; serve without");
-    }
-    match &workbench.device {
-        Device::Driver(chosen) if chosen.kind.has_motors => Some(
-            "the force device is opened by the server itself, and once; write kind = \"remote\" in [device] and run `taut bridge` beside it",
-        ),
-        _ => None,
     }
 }

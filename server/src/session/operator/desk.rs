@@ -9,10 +9,11 @@ use std::time::{Duration, Instant};
 
 use taut_bridge::{ArmSwitch, ArmWish, EventKind};
 use taut_link::proto::proof::{Claim, Grant};
-use taut_link::{JoinPolicy, Role};
+use taut_link::{JoinPolicy, PictureAsker, Role};
 use taut_observers::{Answer, Deed, Desk, Outcome};
 use taut_proto::state::RunState;
 
+use super::pictures::PictureDesk;
 use super::scene_desk::SceneDesk;
 use crate::loops::haptics::HapticsStatistics;
 use crate::session::audit::PageAudit;
@@ -52,6 +53,7 @@ struct Watched {
 pub(super) struct OperatorDesk {
     switch: Arc<ArmSwitch>,
     scenes: Arc<SceneDesk>,
+    pictures: PictureDesk,
     watched: Arc<Mutex<Watched>>,
     audit: PageAudit,
     begun: Instant,
@@ -62,6 +64,7 @@ impl OperatorDesk {
         Self {
             switch,
             scenes,
+            pictures: PictureDesk::default(),
             watched: Arc::default(),
             audit: PageAudit::new(NODE),
             begun: Instant::now(),
@@ -74,8 +77,10 @@ impl OperatorDesk {
         haptics: Arc<HapticsStatistics>,
         clock: SessionClock,
         policy: &JoinPolicy,
+        pictures: PictureAsker,
     ) {
         self.follow_policy(policy);
+        self.pictures.follow(Some(pictures));
         self.watched().seen = Some(Seen {
             haptics,
             clock,
@@ -87,6 +92,7 @@ impl OperatorDesk {
     /// The session is over: nothing is armed until the next.
     pub(super) fn end(&self) {
         self.watched().seen = None;
+        self.pictures.follow(None);
     }
 
     /// Takes who may join: where no operator may, nobody arms from here.
@@ -233,6 +239,23 @@ impl Desk for OperatorDesk {
             None => self.scenes.ask(body, peer),
         };
         asked.inspect_err(|_| self.refused(peer, "a change of the scene that is not taken"))
+    }
+
+    fn pictures(&self, peer: SocketAddr) -> Result<Outcome, String> {
+        let closed = self.watched().closed.clone();
+        let asked = match closed {
+            Some(closed) => Err(format!("not asked: {closed}")),
+            None => self.pictures.ask(),
+        };
+        match &asked {
+            Ok(_) => self.audit.saw(peer),
+            Err(_) => self.refused(peer, "pictures that are not asked for"),
+        }
+        asked
+    }
+
+    fn picture(&self, number: u64) -> Option<Arc<[u8]>> {
+        self.pictures.picture(number)
     }
 
     fn scene(&self) -> Arc<str> {

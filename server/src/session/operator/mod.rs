@@ -3,6 +3,8 @@
 mod desk;
 mod door;
 mod page;
+mod picture_check;
+mod pictures;
 mod recent;
 mod scene_desk;
 mod scene_view;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 use taut_bridge::{Rearm, SafetyEvent, SafetySettings};
-use taut_link::JoinPolicy;
+use taut_link::{JoinPolicy, PictureAsker};
 use taut_observers::StateFeed;
 use taut_observers::lines::run_name;
 use taut_proto::HotState;
@@ -137,10 +137,11 @@ impl OperatorPage {
         statistics: &Statistics,
         clock: SessionClock,
         policy: &JoinPolicy,
+        pictures: PictureAsker,
     ) -> Result<Self, Failure> {
         let door = kept.door(wanted)?;
         let desk = &door.desk;
-        desk.begin(statistics.haptics.clone(), clock, policy);
+        desk.begin(statistics.haptics.clone(), clock, policy, pictures);
         let facts = json(&Facts {
             instance: door.instance.clone(),
             scene_revision: desk.scenes().revision(),

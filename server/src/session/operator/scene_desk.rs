@@ -30,6 +30,9 @@ pub(crate) struct SceneWish {
     /// Whether the scene's file is to have it, too.
     #[serde(default)]
     pub(crate) keep: bool,
+    /// Whether the session is to be recorded: another one of the same scene begins.
+    #[serde(default)]
+    pub(crate) recording: Option<bool>,
 }
 
 /// A wish, who made it, and where the answer goes. Dropped, it is answered with no.
@@ -59,6 +62,8 @@ impl Drop for AskedScene {
 struct State {
     /// Why nobody changes the scene from here.
     closed: Option<String>,
+    /// Why nobody begins or ends a recording from here.
+    not_recorded: Option<String>,
     revision: u64,
     /// The scene, a JSON object.
     shown: Arc<str>,
@@ -78,6 +83,7 @@ impl Default for SceneDesk {
         Self {
             state: Mutex::new(State {
                 closed: Some("this session takes no changes of its scene".to_owned()),
+                not_recorded: Some("this session takes no changes from a page".to_owned()),
                 revision: 1,
                 shown: "null".into(),
                 waiting: None,
@@ -95,6 +101,7 @@ impl SceneDesk {
         state.shown = format!(r#"{{"standing":{said},"scene":{objects}}}"#).into();
         state.revision = standing.revision;
         state.closed = standing.why_closed.map(str::to_owned);
+        state.not_recorded = standing.why_not_recorded.map(str::to_owned);
     }
 
     /// The scene, a JSON object.
@@ -118,7 +125,11 @@ impl SceneDesk {
             )
         })?;
         let mut state = lock(&self.state);
-        if let Some(why) = &state.closed {
+        let closed = match wish.recording {
+            Some(_) => &state.not_recorded,
+            None => &state.closed,
+        };
+        if let Some(why) = closed {
             return Err(format!("not taken: {why}"));
         }
         if state.is_busy {
@@ -191,6 +202,8 @@ mod tests {
             not_kept: &[],
             why_closed: None,
             why_not_kept: None,
+            recording: None,
+            why_not_recorded: None,
         };
         desk.show(&standing, "{}");
     }

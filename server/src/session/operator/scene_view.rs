@@ -25,6 +25,10 @@ pub(crate) struct Standing<'s> {
     pub(crate) why_closed: Option<&'s str>,
     /// Why the file cannot take it; `null` where it can.
     pub(crate) why_not_kept: Option<&'s str>,
+    /// Where the session is recorded.
+    pub(crate) recording: Option<&'s str>,
+    /// Why no recording can be begun or ended; `null` where one can.
+    pub(crate) why_not_recorded: Option<&'s str>,
 }
 
 /// What is in it.

@@ -4,7 +4,9 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 use std::time::Duration;
 
-use taut_link::proto::control::{ControlMessage, Hello, LENGTH_BYTES, MAX_FRAME_BYTES, Welcome};
+use taut_link::proto::control::{
+    ControlMessage, Hello, LENGTH_BYTES, MAX_FRAME_BYTES, Offers, Welcome,
+};
 use taut_link::proto::group::{GroupSealer, SERVER_SENDER};
 use taut_link::proto::header::MAX_DATAGRAM_BYTES;
 use taut_link::proto::proof::Claim;
@@ -61,6 +63,7 @@ impl Liar {
             rate_hz: 0,
             proof: secret.client_proof(&bound, claim),
             grant,
+            offers: Offers::NONE,
         });
         let frame = hello.to_frame().map_err(failed)?;
         send.write_all(&frame).await.map_err(failed)?;
