@@ -67,6 +67,9 @@ pub struct DeployArgs {
     /// Which issue of the credentials: a later one stays good when an earlier one is revoked
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     pub issue: u16,
+    /// The server's service takes up an edited workbench or scene file while it runs (taut serve --follow-scene)
+    #[arg(long)]
+    pub follow_scene: bool,
     /// Replace archives that are there and differ
     #[arg(long)]
     pub force: bool,

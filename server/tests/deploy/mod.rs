@@ -1,5 +1,6 @@
 //! `taut deploy`: what is in each machine's archive, and that what is in them works together.
 
+mod following;
 mod misuse;
 
 use std::fs;

@@ -21,6 +21,7 @@ pub(super) use units::reached_by_a_service;
 use units::{Unit, units};
 
 use super::keys::{NamedCredential, credentials, file_name};
+use super::live_scene::refuse_to_follow;
 use crate::cli::DeployArgs;
 use crate::shared::failure::Failure;
 
@@ -35,6 +36,9 @@ pub(super) fn run(args: &DeployArgs) -> Result<String, Failure> {
         return Err(Failure::bad_input(report));
     }
     let workbench = Workbench::load(&args.config)?;
+    if args.follow_scene {
+        refuse_to_follow(&workbench)?; // as the service would, when it starts
+    }
     let Some(server) = workbench.machines.iter().find(|machine| machine.server) else {
         return Err(Failure::BadInput(format!(
             "{} names no machines; write a [[machine]] for each, with name, address and what it does (docs/deployment.md)",
@@ -51,6 +55,7 @@ pub(super) fn run(args: &DeployArgs) -> Result<String, Failure> {
         workbench: &workbench,
         address: SocketAddr::new(server.address, workbench.network.quic_port),
         credentials: credentials(&key, &workbench, args.issue)?,
+        follow_scene: args.follow_scene,
         key,
     };
     let mut archives = Vec::new();
@@ -75,6 +80,8 @@ struct Plan<'w> {
     address: SocketAddr,
     key: ClusterKey,
     credentials: Vec<NamedCredential>,
+    /// The server's unit takes up edited files.
+    follow_scene: bool,
 }
 
 impl Plan<'_> {
@@ -88,7 +95,7 @@ impl Plan<'_> {
             add(&mut files, self.configuration()?)?;
         }
         add(&mut files, self.screen_files(machine)?)?;
-        let units = units(self.workbench, machine, self.address)?;
+        let units = units(self.workbench, machine, self.address, self.follow_scene)?;
         let scripts = Scripts {
             workbench: &self.workbench.name,
             machine,
@@ -214,18 +221,22 @@ impl Plan<'_> {
 
     /// The service may write to its own folder alone.
     fn writes_where_it_may(&self) -> Result<(), Failure> {
-        match &self.workbench.monitoring.record {
-            Some(path)
-                if self.workbench.monitoring.enabled && !path.starts_with("/var/lib/taut") =>
-            {
-                Err(Failure::BadInput(format!(
-                    "`record` in [monitoring] of {} is {}, where the service may not write; write a file in \"/var/lib/taut\"",
+        let (monitoring, operator) = (&self.workbench.monitoring, &self.workbench.operator);
+        let record = monitoring.record.as_ref().filter(|_| monitoring.enabled);
+        let recordings = operator.recordings.as_ref().filter(|_| operator.enabled);
+        for (path, key, what) in [
+            (record, "`record` in [monitoring]", "file"),
+            (recordings, "`recordings` in [operator]", "folder"),
+        ] {
+            if let Some(path) = path.filter(|path| !path.starts_with("/var/lib/taut")) {
+                return Err(Failure::BadInput(format!(
+                    "{key} of {} is {}, where the service may not write; write a {what} in \"/var/lib/taut\"",
                     self.config.display(),
                     path.display()
-                )))
+                )));
             }
-            _ => Ok(()),
         }
+        Ok(())
     }
 
     /// A service has no terminal on which it could show a fresh token.

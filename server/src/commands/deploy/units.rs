@@ -39,6 +39,7 @@ pub(super) fn units(
     workbench: &Workbench,
     machine: &Machine,
     server: SocketAddr,
+    follow_scene: bool,
 ) -> Result<Vec<Unit>, Failure> {
     let mut units = Vec::new();
     let system = |name: &str, text| Unit {
@@ -51,7 +52,11 @@ pub(super) fn units(
         transport: workbench.network.transport,
     };
     if machine.server {
-        let command = "taut serve --config /etc/taut/workbench.toml --key /etc/taut/cluster.key";
+        let mut command =
+            "taut serve --config /etc/taut/workbench.toml --key /etc/taut/cluster.key".to_owned();
+        if follow_scene {
+            command.push_str(" --follow-scene");
+        }
         let mut more = match &workbench.device {
             Device::Driver(chosen) => {
                 let reached = DeviceChoice::of(chosen)
@@ -66,7 +71,7 @@ pub(super) fn units(
         more.push("Environment=TAUT_DATA=/etc/taut/data".to_owned());
         units.push(system(
             "taut-serve.service",
-            filled(SERVE, machine, command, &more),
+            filled(SERVE, machine, &command, &more),
         ));
     }
     if let Some(device) = &machine.device {

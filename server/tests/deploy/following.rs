@@ -1,0 +1,78 @@
+//! A server whose service takes up edited files, and where recordings of the page may be.
+
+use super::*;
+
+#[test]
+fn a_service_takes_up_an_edited_scene_where_deploy_is_asked_for_that() {
+    let place = prepared();
+    assert_eq!(deploy(&place, &[]).0, Some(0));
+    let plain = command(&unpacked(&place, "haptic-pc"), "taut-serve.service");
+    assert!(!plain.contains(&"--follow-scene".to_owned()), "{plain:?}");
+    let (code, said) = deploy(&place, &["--follow-scene"]);
+    assert!(
+        code == Some(2) && said.contains("--force"),
+        "another archive: {said}"
+    );
+    let (code, said) = deploy(&place, &["--follow-scene", "--force"]);
+    assert_eq!(code, Some(0), "{said}");
+
+    let folder = unpacked(&place, "haptic-pc");
+    let unit = command(&folder, "taut-serve.service");
+    assert_eq!(unit[..plain.len()], plain[..], "nothing else is another");
+    assert_eq!(unit[plain.len()..], ["--follow-scene"]);
+    let server = Running::start(&unit);
+    wait_until("it serves", || server.says("serving on"));
+    let scene = folder.join("etc/scenes/mine.toml");
+    let text = fs::read_to_string(&scene).expect("a scene");
+    let edited = text.replacen("\nname = \"", "\nname = \"edited-", 1);
+    assert_ne!(edited, text);
+    fs::write(&scene, edited).expect("written");
+    wait_until("another session", || {
+        server.text().matches("serving on").count() == 2
+    });
+}
+
+#[test]
+fn what_no_service_could_follow_is_refused_before_there_is_an_archive() {
+    let place = prepared();
+    let mut table: Table = workbench().parse().expect("a workbench");
+    let monitoring = table["monitoring"].as_table_mut().expect("a table");
+    monitoring.insert("enabled".to_owned(), true.into());
+    monitoring.insert("record".to_owned(), "/var/lib/taut/session.rrd".into());
+    place.write("workbench.toml", &table.to_string());
+    let (code, said) = deploy(&place, &["--follow-scene"]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(
+        said.contains("--follow-scene") && said.contains("[monitoring] record"),
+        "{said}"
+    );
+    assert!(!place.path("out").exists());
+    assert_eq!(deploy(&place, &[]).0, Some(0), "without it all is well");
+}
+
+#[test]
+fn recordings_of_the_page_go_where_the_service_may_write() {
+    let place = prepared();
+    place.write("operator.token", "0123456789abcdef0123456789abcdef\n");
+    let token = place.path("operator.token");
+    fs::set_permissions(&token, fs::Permissions::from_mode(0o600)).expect("mine");
+    for (recordings, is_good) in [
+        ("recordings", false),
+        ("/srv/recordings", false),
+        ("/var/lib/taut/recordings", true),
+    ] {
+        let mut table: Table = workbench().parse().expect("a workbench");
+        let operator = table["operator"].as_table_mut().expect("a table");
+        operator.insert("enabled".to_owned(), true.into());
+        operator.insert("token_file".to_owned(), "operator.token".into());
+        operator.insert("recordings".to_owned(), recordings.into());
+        place.write("workbench.toml", &table.to_string());
+        let (code, said) = deploy(&place, &[]);
+        assert_eq!(code == Some(0), is_good, "{recordings}: {said}");
+        let why = "`recordings` in [operator]";
+        assert!(
+            is_good || (said.contains(why) && said.contains("/var/lib/taut")),
+            "{said}"
+        );
+    }
+}
