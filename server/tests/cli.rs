@@ -382,10 +382,10 @@ fn import_makes_a_scene_or_says_what_to_write() {
     let output = taut(&["import", &part, "--out", &out, "--unit", "mm", "--json"]);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
     assert_eq!(
-        report["parts"][0]["findings"][0]["kind"],
+        report["parts"][0]["sources"][0]["findings"][0]["kind"],
         "triangles-turned"
     );
-    assert_eq!(report["parts"][0]["moved_m"], 0.0);
+    assert_eq!(report["parts"][0]["sources"][0]["moved_m"], 0.0);
     let scene = report["scene"].as_str().unwrap_or_default();
     assert!(taut(&["check", scene]).status.success());
     // A picture, or a line that says why there is none.

@@ -34,8 +34,8 @@ pub use fidelity::FidelityPlan;
 pub use files::{DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, data_dir, data_dirs, data_file};
 pub use finished_file::{FinishedFile, free_name, is_taken};
 pub use import::{
-    Finding, ImportReport, ImportRequest, LengthUnit, MAX_HOLE_EDGES, PartReport, UpAxis, import,
-    import_unless,
+    Finding, ForFile, ImportPart, ImportReport, ImportRequest, LengthUnit, MAX_HOLE_EDGES,
+    PartReport, SourceReport, UpAxis, give_to_parts, import, import_unless,
 };
 pub use mesh_file::{
     BodyTexture, BodyTextures, RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply,

@@ -1,9 +1,10 @@
 //! The command lines of those that need no session: parts, scenes, replays, pictures, this machine.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use taut_scene::{LengthUnit, UpAxis};
+use taut_scene::{ForFile, LengthUnit, UpAxis};
 
 use super::values::{
     MOST_VIEWS, film_seconds, hole_edges, output, picture_size, png_file, positive_length,
@@ -106,21 +107,21 @@ pub struct CheckArgs {
 /// `taut import`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "The first part is in the hand, the others stand, each where its file puts it; a first part that touches the others begins above them.\n\nExamples:\n  taut import peg.stl hole.stl --unit mm --out peg-and-hole\n  taut import housing.obj --unit mm --obstacle --out housing && taut demo --scene housing/scene.toml"
+    after_help = "The first part is in the hand, the others stand, each where its file puts it; a first part that touches the others begins above them.\nFiles that are written as BODY=FILE with the same BODY are one body of that name.\n\nExamples:\n  taut import peg.stl hole.stl --unit mm --out peg-and-hole\n  taut import peg.stl housing=base.stl housing=lid.obj --unit mm --unit lid.obj=inch --out fit\n  taut import housing.obj --unit mm --obstacle --out housing && taut demo --scene housing/scene.toml"
 )]
 pub struct ImportArgs {
-    /// Mesh files: .stl, .obj, .ply, .glb, .gltf
+    /// Mesh files: .stl, .obj, .ply, .glb, .gltf; files written as BODY=FILE are one body together
     #[arg(required = true, value_name = "PART")]
-    pub parts: Vec<PathBuf>,
+    pub parts: Vec<OsString>,
     /// The new folder for meshes and scene.toml; one that exists is refused
     #[arg(long, value_name = "FOLDER", value_parser = output())]
     pub out: PathBuf,
-    /// Unit of parts whose format names none, STL, OBJ and PLY: m, dm, cm, mm, um, inch (default: m, for parts of a size to be held); glTF is in metres
-    #[arg(long, value_name = "UNIT")]
-    pub unit: Option<LengthUnit>,
-    /// Which way is up in the parts, y or z: with y, as glTF has it, all are turned so that it is +z of the scene (default: z)
-    #[arg(long, value_name = "AXIS")]
-    pub up: Option<UpAxis>,
+    /// Unit of parts whose format names none, STL, OBJ and PLY: m, dm, cm, mm, um, inch (default: m, for parts of a size to be held); glTF is in metres; repeated as FILE=UNIT, that of one file
+    #[arg(long, value_name = "[FILE=]UNIT")]
+    pub unit: Vec<ForFile<LengthUnit>>,
+    /// Which way is up in the parts, y or z: with y, as glTF has it, all are turned so that it is +z of the scene (default: z); repeated as FILE=AXIS, that of one file
+    #[arg(long, value_name = "[FILE=]AXIS")]
+    pub up: Vec<ForFile<UpAxis>>,
     /// Use as few triangles as keep within this distance of the part
     #[arg(long, value_name = "METRES", value_parser = positive_length, allow_negative_numbers = true)]
     pub simplify: Option<f64>,
@@ -133,6 +134,9 @@ pub struct ImportArgs {
     /// Take only this node, object or group of files that name any, and all that is part of it; may be repeated (default: all, as one body)
     #[arg(long, value_name = "NAME")]
     pub only: Vec<String>,
+    /// Make each node, object or group a body of its own; with --only, of those (default: a file is one body)
+    #[arg(long)]
+    pub split: bool,
     /// Name of the scene (default: the folder's)
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,

@@ -1,6 +1,6 @@
 //! `taut import`: parts into a folder with meshes, a scene and its picture. The work is `taut_scene::import`.
 
-use taut_scene::{ImportReport, ImportRequest};
+use taut_scene::{ImportPart, ImportReport, ImportRequest, Problem, give_to_parts};
 
 use super::preview;
 use crate::cli::ImportArgs;
@@ -9,17 +9,22 @@ use crate::shared::shutdown::Shutdown;
 
 /// Imports, or says every fault of every part.
 pub(super) fn run(args: &ImportArgs) -> Result<ImportReport, Failure> {
+    let mut parts: Vec<ImportPart> = args.parts.iter().map(|w| ImportPart::named(w)).collect();
+    let bad = |problem: Problem| Failure::BadInput(problem.to_string());
+    let unit = give_to_parts("--unit", &args.unit, &mut parts, |part| &mut part.unit);
+    let up = give_to_parts("--up", &args.up, &mut parts, |part| &mut part.up);
     let request = ImportRequest {
-        parts: args.parts.clone(),
+        parts,
         folder: args.out.clone(),
-        unit: args.unit,
-        up: args.up,
+        unit: unit.map_err(bad)?,
+        up: up.map_err(bad)?,
         simplify: args.simplify,
         close_holes: args.close_holes,
         thicken: args.thicken,
         name: args.name.clone(),
         obstacles_only: args.obstacle,
         only: args.only.clone(),
+        split: args.split,
     };
     // Until there is something to remove, a signal ends the process as ever.
     let mut signals = None;

@@ -2,73 +2,55 @@
 //!
 //! Every repair moves a point by at most a stated distance, or is refused. What cannot be repaired is said with its place; nothing is written then.
 
+mod body;
 mod edges;
 mod faces;
 mod folder;
 mod hand_path;
 mod holes;
+mod looks;
 mod manifold;
+mod names;
 mod orientation;
-mod part;
 mod placing;
 mod repair;
 mod report;
+mod request;
 mod scene_text;
 mod shell;
+mod source;
 mod stitch;
 mod unit;
 mod visual;
 mod weld;
 
-use std::path::PathBuf;
+use std::collections::HashSet;
 
 use nalgebra::Point3;
 
 pub use holes::MAX_HOLE_EDGES;
 pub use placing::UpAxis;
-pub use report::{Finding, ImportReport, PartReport};
+pub use report::{Finding, ImportReport, PartReport, SourceReport};
+pub use request::{ForFile, ImportPart, ImportRequest, give_to_parts};
 pub use unit::LengthUnit;
 
 use crate::check::place_text;
-use crate::mesh_file::{RawMesh, write_ply};
+use crate::mesh_file::write_ply;
 use crate::problem::{FileError, Problem};
 use crate::scene::{GOD_OBJECT_NAME, RESERVED_NAMES, Scene};
+use body::{Body, body};
 use folder::NewFolder;
 use hand_path::hand_path;
-use part::{Part, new_name, part};
+use names::Names;
 use placing::{move_to_origin, note_up};
 use scene_text::{HAND_SECTION, Placed, around, clear_above, scene_text, sphere_radius};
+use source::{Read, Source};
 use visual::Visual;
 
 /// Name of the scene file in the folder.
 const SCENE_FILE: &str = "scene.toml";
 /// Name of the path of the simulated hand there.
 const HAND_FILE: &str = "hand.csv";
-
-/// What to import, and how.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ImportRequest {
-    /// Mesh files; the first one is the god-object.
-    pub parts: Vec<PathBuf>,
-    /// The folder to write; there must be nothing of that name.
-    pub folder: PathBuf,
-    /// Unit of files that name none of their own: STL, OBJ, PLY.
-    pub unit: Option<LengthUnit>,
-    /// Which way is up in the files; `None` takes them as they are, and says so of glTF.
-    pub up: Option<UpAxis>,
-    /// Most distance by which a simplified mesh may differ, m.
-    pub simplify: Option<f64>,
-    /// Most edges of a hole that is closed; `None` closes small ones, and with `thicken` none.
-    pub close_holes: Option<usize>,
-    /// Thickness of the solid that an open sheet becomes, m; `None` refuses sheets.
-    pub thicken: Option<f64>,
-    /// Name of the scene; `None` takes the folder's.
-    pub name: Option<String>,
-    /// All parts stand, and a sphere is in the hand.
-    pub obstacles_only: bool,
-    /// Nodes, objects or groups that are taken of each file that names any; none takes all.
-    pub only: Vec<String>,
-}
 
 /// Reads, repairs and writes. All faults of all parts are reported; with any, nothing is written.
 pub fn import(request: &ImportRequest) -> Result<ImportReport, FileError> {
@@ -82,32 +64,11 @@ pub fn import_unless(
 ) -> Result<ImportReport, FileError> {
     // What cannot be made is refused before the work; nothing is there while it lasts.
     drop(NewFolder::create(&request.folder)?);
-    let (mut parts, mut visuals) = read_parts(request)?;
+    let mut bodies = read_bodies(request)?;
     let mut notes = Vec::new();
     note_up(request, &mut notes);
-    if let Some(way) = move_to_origin(&mut parts, &mut notes) {
-        visuals
-            .iter_mut()
-            .flatten()
-            .for_each(|visual| visual.move_by(&way));
-    }
-    let placed: Vec<Placed> = parts
-        .iter()
-        .zip(&visuals)
-        .map(|((report, mesh), visual)| {
-            let (low, high) = mesh
-                .bounds()
-                .unwrap_or((Point3::origin(), Point3::origin()));
-            Placed {
-                body: report.body.clone(),
-                mesh_file: report.mesh_file.clone(),
-                appearance: report.appearance,
-                visual_file: visual.as_ref().map(Visual::file),
-                low,
-                high,
-            }
-        })
-        .collect();
+    move_to_origin(&mut bodies, &mut notes);
+    let placed: Vec<Placed> = bodies.iter().map(Placed::of).collect();
     let mut go_on = || {
         if is_interrupted() {
             let text = "the import was interrupted; nothing was written";
@@ -117,14 +78,14 @@ pub fn import_unless(
     };
     go_on()?;
     let folder = NewFolder::create(&request.folder)?;
-    let mut reports = Vec::with_capacity(parts.len());
-    for ((report, mesh), visual) in parts.into_iter().zip(visuals) {
+    let mut reports = Vec::with_capacity(bodies.len());
+    for body in bodies {
         go_on()?;
-        folder.write(&report.mesh_file, &write_ply(&mesh))?;
-        for (name, bytes) in visual.iter().flat_map(Visual::files) {
+        folder.write(&body.report.mesh_file, &write_ply(&body.mesh))?;
+        for (name, bytes) in body.visual.iter().flat_map(Visual::files) {
             folder.write(&name, &bytes)?;
         }
-        reports.push(report);
+        reports.push(body.report);
     }
     go_on()?;
     write_scene(request, &folder, &placed, &mut notes)?;
@@ -141,38 +102,28 @@ pub fn import_unless(
     Ok(report)
 }
 
-/// Reports and surfaces of all parts, and what is drawn instead of some.
-type ReadParts = (Vec<(PartReport, RawMesh)>, Vec<Option<Visual>>);
-
-/// All parts, or all faults of all parts.
-fn read_parts(request: &ImportRequest) -> Result<ReadParts, FileError> {
+/// All bodies, or all faults of all files.
+fn read_bodies(request: &ImportRequest) -> Result<Vec<Body>, FileError> {
     let mut problems = Vec::new();
-    let mut names = RESERVED_NAMES.map(str::to_owned).to_vec();
-    let (mut parts, mut visuals) = (Vec::new(), Vec::new());
-    let mut names_found = vec![false; request.only.len()];
-    for (index, path) in request.parts.iter().enumerate() {
-        let own = new_name(path, &mut names);
-        let held = index == 0 && !request.obstacles_only;
-        let body = if held { GOD_OBJECT_NAME } else { &own };
-        match part(path, body, &format!("{own}.ply"), request) {
-            Ok(Part {
-                report,
-                mesh,
-                visual,
-                pieces,
-            }) => {
-                for (found, name) in names_found.iter_mut().zip(&request.only) {
-                    *found |= pieces.has(name);
-                }
-                parts.push((report, mesh));
-                visuals.push(visual);
+    let mut names = Names::without(&RESERVED_NAMES);
+    let mut bodies: Vec<Body> = Vec::new();
+    let mut found = HashSet::new();
+    for files in request.bodies() {
+        for (called, sources) in sources_of(&files, request, &mut found) {
+            let own = names.name(&called);
+            let held = bodies.is_empty() && problems.is_empty() && !request.obstacles_only;
+            let name = if held { GOD_OBJECT_NAME } else { &own };
+            let made =
+                sources.and_then(|sources| body(name, &format!("{own}.ply"), sources, request));
+            match made {
+                Ok(body) => bodies.push(body),
+                Err(error) => problems.extend(error.into_problems()),
             }
-            Err(error) => problems.extend(error.into_problems()),
         }
     }
     if problems.is_empty() {
-        let missing = names_found.iter().zip(&request.only);
-        problems.extend(missing.filter(|(found, _)| !**found).map(|(_, name)| {
+        let missing = request.only.iter().filter(|name| !found.contains(*name));
+        problems.extend(missing.map(|name| {
             let text = format!(
                 "no part has a node, object or group \"{name}\"; `taut check` lists those of a file"
             );
@@ -180,7 +131,40 @@ fn read_parts(request: &ImportRequest) -> Result<ReadParts, FileError> {
         }));
     }
     FileError::unless_empty(problems)?;
-    Ok((parts, visuals))
+    Ok(bodies)
+}
+
+/// Bodies of these files: one of all, or with `split` one of each piece of the only one. With what each is called; `found` are the names in `only` that were met.
+fn sources_of<'r>(
+    files: &[&ImportPart],
+    request: &'r ImportRequest,
+    found: &mut HashSet<&'r String>,
+) -> Vec<(String, Result<Vec<Source>, FileError>)> {
+    let mut read = |part: &ImportPart| {
+        let read = Read::of(&part.path)?;
+        found.extend(request.only.iter().filter(|name| read.has(name)));
+        Ok::<Read, FileError>(read)
+    };
+    let first = files[0];
+    if let (true, [part], None) = (request.split, files, &first.body) {
+        return match read(part).and_then(|read| read.split(part, request)) {
+            Ok(pieces) => {
+                let one = |source: Result<Source, FileError>| source.map(|source| vec![source]);
+                pieces.into_iter().map(|(name, s)| (name, one(s))).collect()
+            }
+            Err(error) => vec![(String::new(), Err(error))],
+        };
+    }
+    let (mut sources, mut problems) = (Vec::new(), Vec::new());
+    for part in files {
+        match read(part).and_then(|read| read.joined(part, request)) {
+            Ok(source) => sources.push(source),
+            Err(error) => problems.extend(error.into_problems()),
+        }
+    }
+    let stem = first.path.file_stem().unwrap_or_default().to_string_lossy();
+    let called = first.body.clone().unwrap_or_else(|| stem.into_owned());
+    vec![(called, FileError::unless_empty(problems).map(|()| sources))]
 }
 
 /// Writes the scene with the held body where its file puts it or, where it would touch the others, above them.

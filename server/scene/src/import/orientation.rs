@@ -77,9 +77,9 @@ pub(super) fn agree(mesh: &mut RawMesh) -> Result<Places, OneSided> {
 #[derive(Debug, Default)]
 pub(super) struct Nesting {
     pub(super) parts: usize,
-    /// Middles of the parts that were turned, and of how many triangles they are.
+    /// Middles of the parts that were turned, and their triangles.
     pub(super) turned: Places,
-    pub(super) turned_triangles: usize,
+    pub(super) turned_triangles: Vec<u32>,
     /// Middles of the walls of cavities.
     pub(super) cavities: Places,
 }
@@ -99,10 +99,10 @@ pub(super) fn turn_outward(mesh: &mut RawMesh) -> Nesting {
         }
         if (part.volume < 0.0) != is_cavity {
             nesting.turned.add(part.center);
-            nesting.turned_triangles += part.triangles.len();
-            for t in part.triangles {
-                mesh.triangles[t as usize].swap(1, 2);
+            for t in &part.triangles {
+                mesh.triangles[*t as usize].swap(1, 2);
             }
+            nesting.turned_triangles.extend(part.triangles);
         }
     }
     nesting

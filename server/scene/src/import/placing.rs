@@ -4,8 +4,8 @@ use std::str::FromStr;
 
 use nalgebra::{Point3, Vector3};
 
-use super::ImportRequest;
-use super::report::PartReport;
+use super::body::Body;
+use super::request::{ImportPart, ImportRequest};
 use crate::check::place_text;
 use crate::mesh_file::{RawMesh, is_gltf_path};
 
@@ -45,36 +45,50 @@ pub(super) fn upright(mut mesh: RawMesh, up: Option<UpAxis>) -> RawMesh {
 
 /// Says that parts were turned, or that they may have to be.
 pub(super) fn note_up(request: &ImportRequest, notes: &mut Vec<String>) {
-    let any_gltf = request.parts.iter().any(|path| is_gltf_path(path));
-    let text = match request.up {
-        Some(UpAxis::Y) => {
-            "the parts were turned: +y of their files is +z of the scene; places above are those in the files"
-        }
-        None if any_gltf => {
-            "up is +y in glTF and +z in a scene; nothing was turned: write --up y to set the parts upright, or --up z if they are"
-        }
-        _ => return,
-    };
-    notes.push(text.to_owned());
+    let up_of = |part: &&ImportPart| request.up_of(part);
+    let turned: Vec<&ImportPart> = request
+        .parts
+        .iter()
+        .filter(|part| up_of(part) == Some(UpAxis::Y))
+        .collect();
+    if turned.len() == request.parts.len() {
+        notes.push("the parts were turned: +y of their files is +z of the scene; places above are those in the files".to_owned());
+    } else if !turned.is_empty() {
+        let names: Vec<String> = turned
+            .iter()
+            .map(|part| part.path.display().to_string())
+            .collect();
+        notes.push(format!(
+            "{} turned: +y of these files is +z of the scene; places above are those in the files, and of a body of files with both those in the scene",
+            names.join(", ")
+        ));
+    }
+    let doubtful = |part: &ImportPart| is_gltf_path(&part.path) && up_of(&part).is_none();
+    if request.parts.iter().any(doubtful) {
+        notes.push("up is +y in glTF and +z in a scene; nothing was turned: write --up y to set the parts upright, or --up z if they are".to_owned());
+    }
 }
 
-/// Parts keep their places to each other; only when all are far away, all are moved by the same way, which is given.
-pub(super) fn move_to_origin(
-    parts: &mut [(PartReport, RawMesh)],
-    notes: &mut Vec<String>,
-) -> Option<Vector3<f64>> {
-    let boxes = parts.iter().filter_map(|(_, mesh)| mesh.bounds());
-    let (low, high) = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))?;
+/// Bodies keep their places to each other; only when all are far away, all are moved by the same way.
+pub(super) fn move_to_origin(bodies: &mut [Body], notes: &mut Vec<String>) {
+    let boxes = bodies.iter().filter_map(|body| body.mesh.bounds());
+    let Some((low, high)) = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1))) else {
+        return;
+    };
     let way: Vector3<f64> = -nalgebra::center(&low, &high).coords;
     if way.norm() <= FAR_AWAY * (high - low).norm() {
-        return None;
+        return;
     }
-    for vertex in parts.iter_mut().flat_map(|(_, mesh)| &mut mesh.vertices) {
-        *vertex += way;
+    for body in bodies {
+        for vertex in &mut body.mesh.vertices {
+            *vertex += way;
+        }
+        if let Some(visual) = &mut body.visual {
+            visual.move_by(&way);
+        }
     }
     notes.push(format!(
         "the parts lie far from the origin of their files; all were moved by the same {}, and places above are those before",
         place_text(&Point3::from(way))
     ));
-    Some(way)
 }

@@ -1,14 +1,13 @@
 //! One part, from what a file holds to a surface that the method can use, or every reason why not.
 
-use god_object::Mesh;
 use nalgebra::Point3;
 
-use super::edges::{borders, components};
+use super::edges::components;
 use super::holes::{self, MAX_HOLE_EDGES};
 use super::report::{Finding, Places};
 use super::weld::{self, WIDEST_SHARE, Welded};
 use super::{faces, manifold, orientation, shell, stitch};
-use crate::check::{MeshFigures, place_text};
+use crate::check::place_text;
 use crate::mesh_file::RawMesh;
 
 /// Most loose parts of one file: how they lie in each other is asked of each pair.
@@ -23,10 +22,10 @@ pub(super) struct Wishes {
     pub(super) thicken: Option<f64>,
 }
 
-/// A surface that can be used, and what was done.
+/// A closed surface, and what was done; which side of its parts is outside is not yet known.
 #[derive(Debug)]
 pub(super) struct Repaired {
-    pub(super) mesh: Mesh,
+    pub(super) mesh: RawMesh,
     pub(super) findings: Vec<Finding>,
     /// Farthest that a point of the surface was moved, m.
     pub(super) moved: f64,
@@ -63,9 +62,8 @@ pub(super) fn repair(
     );
     make_surfaces(&mut mesh, &mut findings)?;
     let thickened = close(&mut mesh, wishes, &mut findings)?;
-    turn(&mut mesh, &mut findings);
     Ok(Repaired {
-        mesh: checked(mesh)?,
+        mesh,
         findings,
         moved: welded.moved + stitched.moved,
         thickened,
@@ -254,41 +252,8 @@ fn open_text(open: &[holes::Loop], tried: Option<usize>) -> String {
     )
 }
 
-fn turn(mesh: &mut RawMesh, findings: &mut Vec<Finding>) {
-    if !borders(&mesh.triangles).is_empty() {
-        return; // said below, by the faults
-    }
-    let nesting = orientation::turn_outward(mesh);
-    note(findings, "parts-turned", &nesting.turned, |n| {
-        format!(
-            "turned {n} closed parts of {} triangles, which were inside out",
-            nesting.turned_triangles
-        )
-    });
-    note(findings, "cavities", &nesting.cavities, |n| {
-        format!(
-            "kept {n} closed parts as walls of cavities: they lie inside another of the {} closed parts",
-            nesting.parts
-        )
-    });
-}
-
-/// The surface as the method takes it.
-fn checked(mesh: RawMesh) -> Result<Mesh, Vec<String>> {
-    let faults = MeshFigures::of(&mesh).faults();
-    if !faults.is_empty() {
-        let all = faults.into_iter().map(|fault| {
-            format!(
-                "still has faults after all repairs: {}; mend them in the program that made it",
-                fault.what
-            )
-        });
-        return Err(all.collect());
-    }
-    Mesh::new(mesh.vertices, mesh.triangles).map_err(|error| vec![error.to_string()])
-}
-
-fn note(
+/// Notes what was found somewhere.
+pub(super) fn note(
     findings: &mut Vec<Finding>,
     kind: &'static str,
     places: &Places,

@@ -66,15 +66,13 @@ impl Finding {
     }
 }
 
-/// What became of one part.
+/// What became of one file, or of a piece of one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PartReport {
+pub struct SourceReport {
     /// The file, as the user named it.
     pub file: String,
-    /// The body in the scene: `god-object`, or the obstacle's name.
-    pub body: String,
-    /// The mesh file, in the folder.
-    pub mesh_file: String,
+    /// The node, object or group of it that is a body by itself; absent of a file that was not split.
+    pub piece: Option<String>,
     /// The unit in which the file was read.
     pub unit: &'static str,
     /// Whether nobody named that unit: not the user, not the format.
@@ -85,9 +83,32 @@ pub struct PartReport {
     pub moved_m: f64,
     /// No point of a sheet is farther from the solid that it became, m; absent where nothing was thickened.
     pub thickened_m: Option<f64>,
+}
+
+impl SourceReport {
+    /// The file, and its piece.
+    pub(super) fn name(&self) -> String {
+        match &self.piece {
+            None => self.file.clone(),
+            Some(piece) => format!("{} \"{piece}\"", self.file),
+        }
+    }
+}
+
+/// What became of one body.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PartReport {
+    /// The files that it is made of, in order: one at least.
+    pub sources: Vec<SourceReport>,
+    /// The body in the scene: `god-object`, or the obstacle's name.
+    pub body: String,
+    /// The mesh file, in the folder.
+    pub mesh_file: String,
+    /// What was found in the body as a whole and done to it, in order.
+    pub findings: Vec<Finding>,
     /// No point of the simplified surface is farther from the other one, either way, m; absent where nothing was simplified.
     pub simplified_m: Option<f64>,
-    /// How the file says that the part looks; the scene says the same.
+    /// How the files say that the body looks; the scene says the same.
     pub appearance: Appearance,
     /// Figures of the mesh that was written.
     pub mesh: MeshFigures,
@@ -109,6 +130,18 @@ pub struct ImportReport {
 }
 
 impl PartReport {
+    /// What was found in its files and in all of it, in order.
+    pub fn all_findings(&self) -> impl Iterator<Item = &Finding> {
+        let of_files = self.sources.iter().flat_map(|source| &source.findings);
+        of_files.chain(&self.findings)
+    }
+
+    /// No point of a surface in its files was moved farther, m.
+    pub fn moved_m(&self) -> f64 {
+        let sources = self.sources.iter();
+        sources.map(|source| source.moved_m).fold(0.0, f64::max)
+    }
+
     pub(super) fn simplified(&mut self, outcome: &Simplified) {
         let text = match &outcome.unchanged {
             None => {
@@ -150,26 +183,38 @@ impl fmt::Display for Finding {
 
 impl fmt::Display for PartReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let assumed = if self.unit_assumed { ", assumed" } else { "" };
+        for (index, source) in self.sources.iter().enumerate() {
+            let plus = if index > 0 { " + " } else { "" };
+            let assumed = if source.unit_assumed { ", assumed" } else { "" };
+            write!(f, "{plus}{} (in {}{assumed})", source.name(), source.unit)?;
+        }
         write!(
             f,
-            "{} (in {}{assumed}): {} in {}, {} triangles, {}, {:.3e} m^3",
-            self.file,
-            self.unit,
+            ": {} in {}, {} triangles, {}, {:.3e} m^3",
             self.body,
             self.mesh_file,
             self.mesh.triangles,
             size_text(self.mesh.size_m),
             self.mesh.volume_m3
         )?;
+        let is_joined = self.sources.len() > 1;
+        for source in &self.sources {
+            for finding in &source.findings {
+                if is_joined {
+                    write!(f, "\n  {}: {finding}", source.file)?;
+                } else {
+                    write!(f, "\n  {finding}")?;
+                }
+            }
+        }
         for finding in &self.findings {
             write!(f, "\n  {finding}")?;
         }
-        if self.moved_m > 0.0 {
+        if self.moved_m() > 0.0 {
             write!(
                 f,
                 "\n  no point of the surface was moved farther than {:.3e} m",
-                self.moved_m
+                self.moved_m()
             )
         } else {
             write!(f, "\n  no point of the surface was moved")

@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 
 use nalgebra::{Point3, center};
 
+use super::body::Body;
+use super::visual::Visual;
 use crate::appearance::{Appearance, text_of_colour};
 
 /// What is drawn is about this wide, m.
@@ -33,6 +35,21 @@ pub(super) struct Placed {
     pub(super) visual_file: Option<String>,
     pub(super) low: Point3<f64>,
     pub(super) high: Point3<f64>,
+}
+
+impl Placed {
+    pub(super) fn of(body: &Body) -> Self {
+        let nothing = (Point3::origin(), Point3::origin());
+        let (low, high) = body.mesh.bounds().unwrap_or(nothing);
+        Self {
+            body: body.report.body.clone(),
+            mesh_file: body.report.mesh_file.clone(),
+            appearance: body.report.appearance,
+            visual_file: body.visual.as_ref().map(Visual::file),
+            low,
+            high,
+        }
+    }
 }
 
 /// Smallest and largest corner of the box around some parts; `None` of none.

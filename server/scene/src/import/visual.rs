@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use taut_proto::Wrap;
 
 use crate::appearance::{Appearance, encoded};
-use crate::mesh_file::{BodyTexture, BodyTextures, FileLook, RawMesh};
+use crate::mesh_file::{BodyTexture, BodyTextures, RawMesh};
 
 /// A surface with looks.
 #[derive(Clone, Debug)]
@@ -23,23 +23,22 @@ pub(super) struct Visual {
 }
 
 impl Visual {
-    /// Of a part's file, where that says more than one look; `placed` brings its mesh to where the part stands.
-    pub(super) fn of(
+    /// Of a body that is written into `body_file`; all triangles are in the runs.
+    pub(super) fn new(
         mesh: RawMesh,
-        look: &FileLook,
+        parts: Vec<(Appearance, usize)>,
+        textures: Option<Arc<BodyTextures>>,
         body_file: &str,
-        placed: impl FnOnce(RawMesh) -> RawMesh,
-    ) -> Option<Self> {
-        let parts = look.drawn_parts(&Appearance::default(), &mesh);
+    ) -> Self {
         let stem = body_file
             .rsplit_once('.')
             .map_or(body_file, |(stem, _)| stem);
-        (!parts.is_empty()).then(|| Self {
-            mesh: placed(mesh),
+        Self {
+            mesh,
             parts,
-            textures: look.textures.clone(),
+            textures,
             name: format!("{stem}-visual"),
-        })
+        }
     }
 
     pub(super) fn move_by(&mut self, way: &Vector3<f64>) {

@@ -1,5 +1,6 @@
 //! Materials of mesh files: which covers the most of a body, and what of the file's look is not drawn.
 
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -38,12 +39,14 @@ pub(super) struct Materials {
     pub(super) coordinates: Vec<Corners>,
     /// Files beside the mesh that say what materials look like, as the mesh names them.
     pub(super) libraries: Vec<String>,
-    /// What was said of libraries that were read, and whether there were others.
-    read: (Vec<String>, bool),
     /// Vertices have colours of their own.
     pub(super) vertex_colours: bool,
     /// Faces have.
     pub(super) face_colours: bool,
+    /// What is wrong with the libraries, as parts of a sentence.
+    lost: Vec<String>,
+    /// Some library could not be read.
+    some_unread: bool,
 }
 
 /// How a mesh file says that its body looks.
@@ -115,34 +118,50 @@ impl Materials {
         }
     }
 
-    /// Those of the triangles that are `chosen`, in the mesh's order.
-    pub(super) fn keep(&mut self, chosen: &[bool]) {
-        let mut is_chosen = chosen.iter();
-        self.coordinates
-            .retain(|_| is_chosen.next().is_some_and(|chosen| *chosen));
-        let mut chosen = chosen.iter();
-        for (material, count) in std::mem::take(&mut self.runs) {
-            let kept = chosen.by_ref().take(count).filter(|kept| **kept).count();
-            if kept > 0 {
-                self.push(material, kept);
-            }
+    /// The place in the list of every triangle's material; empty of a format without materials.
+    pub(super) fn of_triangles(&self) -> Vec<Option<usize>> {
+        let runs = self.runs.iter();
+        let each = runs.flat_map(|(material, count)| std::iter::repeat_n(*material, *count));
+        each.collect()
+    }
+
+    /// The materials of some triangles alone, in this order; `of_triangles` are those of all.
+    pub(super) fn some(&self, triangles: &[u32], of_triangles: &[Option<usize>]) -> Self {
+        let wanted = || {
+            triangles
+                .iter()
+                .filter_map(|t| of_triangles.get(*t as usize))
+        };
+        let used: BTreeSet<usize> = wanted().flatten().copied().collect();
+        let places: HashMap<usize, usize> = used.iter().copied().zip(0..).collect();
+        let coordinates = triangles.iter().map(|t| self.coordinates.get(*t as usize));
+        let mut some = Self {
+            list: used.iter().map(|place| self.list[*place].clone()).collect(),
+            runs: Vec::new(),
+            coordinates: coordinates.flatten().copied().collect(),
+            libraries: Vec::new(),
+            lost: self.lost.clone(),
+            ..*self
+        };
+        for material in wanted() {
+            some.push(material.map(|place| places[&place]), 1);
         }
+        some
     }
 
     /// Reads the libraries that lie in `directory`.
     pub(super) fn read_libraries(&mut self, directory: Option<&Path>) {
         for library in std::mem::take(&mut self.libraries) {
-            let (lost, some_unread) = &mut self.read;
             let inside = directory.zip(below(&library));
             let read = inside.map(|(directory, name)| {
                 let folder = name.parent().unwrap_or(Path::new(""));
                 read_library(&directory.join(&name), folder, &mut self.list)
             });
-            *some_unread |= !matches!(read, Some(Ok(_)));
+            self.some_unread |= !matches!(read, Some(Ok(_)));
             match read {
-                Some(Ok(faults)) => lost.extend(faults),
-                Some(Err(problem)) => lost.push(format!("its materials: {problem}")),
-                None => lost.push(format!(
+                Some(Ok(faults)) => self.lost.extend(faults),
+                Some(Err(problem)) => self.lost.push(format!("its materials: {problem}")),
+                None => self.lost.push(format!(
                     "its materials in `{library}`, which must lie beside it"
                 )),
             }
@@ -154,10 +173,9 @@ impl Materials {
         self.list.iter().any(|material| material.picture.is_some())
     }
 
-    /// Reads the libraries and pictures that lie in `directory`; then how the body looks.
+    /// Reads the pictures that lie in `directory`; then how a body of these triangles looks.
     pub(super) fn look(mut self, mesh: &RawMesh, directory: Option<&Path>) -> FileLook {
-        self.read_libraries(directory);
-        let (mut lost, some_unread) = std::mem::take(&mut self.read);
+        let mut lost = std::mem::take(&mut self.lost);
         let areas = self.areas(mesh);
         let seen = |place: &usize| areas[*place] > 0.0;
         let places: Vec<usize> = (0..areas.len()).filter(seen).collect();
@@ -196,7 +214,7 @@ impl Materials {
         }
         // A library that cannot be read is said above, and may define them.
         let undefined = places.iter().filter_map(|place| self.list.get(*place));
-        let undefined = undefined.filter(|material| !some_unread && !material.is_defined);
+        let undefined = undefined.filter(|material| !self.some_unread && !material.is_defined);
         lost.extend(undefined.take(MAX_UNDEFINED).map(|material| {
             format!(
                 "its material \"{}\", which no library defines",
@@ -269,7 +287,7 @@ mod tests {
         for (material, triangles) in runs {
             materials.push(*material, *triangles);
         }
-        materials.look(&cuboid([1.0, 1.0, 1.0]), None)
+        materials.look(&cuboid([1.0, 1.0, 1.0]))
     }
 
     #[test]

@@ -26,6 +26,6 @@ pub(crate) use pieces::Pieces;
 pub use ply::write_ply;
 pub use raw_mesh::RawMesh;
 use read::Fault;
-pub(crate) use read::{MeshPart, files_beside, is_gltf_path, read_part};
+pub(crate) use read::{MeshFile, files_beside, is_gltf_path, read_part};
 pub use read::{is_mesh_path, read_mesh, read_mesh_bytes};
 pub(crate) use texture_coordinates::read_texture_coordinates;

@@ -1,6 +1,7 @@
 //! Named pieces of a mesh file: nodes of glTF, objects and groups of OBJ, solids of an STL text. All are one body, or some are chosen.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 
 /// Most names that a sentence lists.
 const MAX_LISTED: usize = 12;
@@ -62,14 +63,47 @@ impl Pieces {
         with_triangles.any(|run| run.names.iter().any(|other| other == name))
     }
 
-    /// Which triangles have one of these names.
-    pub(super) fn chosen(&self, only: &[String]) -> Vec<bool> {
-        let mut chosen = Vec::new();
-        for run in &self.runs {
-            let is_chosen = run.names.iter().any(|name| only.contains(name));
-            chosen.resize(chosen.len() + run.triangles, is_chosen);
-        }
+    /// The triangles that have one of these names, ascending.
+    pub(crate) fn chosen(&self, only: &[String]) -> Vec<u32> {
+        let is_chosen = |run: &&(&Run, Range<u32>)| {
+            let mut names = run.0.names.iter();
+            names.any(|name| only.contains(name))
+        };
+        let runs: Vec<(&Run, Range<u32>)> = self.runs_with_triangles().collect();
+        let chosen = runs.iter().filter(is_chosen);
         chosen
+            .flat_map(|(_, triangles)| triangles.clone())
+            .collect()
+    }
+
+    /// The triangles of each piece, in the order of their first ones; those without a name are one. With names in `only`, of pieces that have one of them.
+    pub(crate) fn apart(&self, only: &[String]) -> Vec<(Option<&str>, Vec<u32>)> {
+        let mut places: HashMap<Option<&str>, usize> = HashMap::new();
+        let mut apart: Vec<(Option<&str>, Vec<u32>)> = Vec::new();
+        for (run, triangles) in self.runs_with_triangles() {
+            if !only.is_empty() && !run.names.iter().any(|name| only.contains(name)) {
+                continue;
+            }
+            let own = run.names.first().map(String::as_str);
+            let place = *places.entry(own).or_insert_with(|| {
+                apart.push((own, Vec::new()));
+                apart.len() - 1
+            });
+            apart[place].1.extend(triangles);
+        }
+        apart
+    }
+
+    /// Runs, with their triangles by number.
+    fn runs_with_triangles(&self) -> impl Iterator<Item = (&Run, Range<u32>)> {
+        let mut next = 0_u32;
+        let runs = self.runs.iter().map(move |run| {
+            let first = next;
+            // No file has more than 32 bits count.
+            next = next.saturating_add(u32::try_from(run.triangles).unwrap_or(u32::MAX));
+            (run, first..next)
+        });
+        runs.filter(|(_, triangles)| !triangles.is_empty())
     }
 
     /// The names, as a part of a sentence.

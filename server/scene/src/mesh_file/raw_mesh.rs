@@ -74,6 +74,31 @@ impl RawMesh {
         }
     }
 
+    /// Some of the triangles, in this order, and the vertices that they name.
+    #[must_use]
+    pub(crate) fn some(&self, triangles: &[u32]) -> Self {
+        let mut places: HashMap<u32, u32> = HashMap::new();
+        let mut some = Self::default();
+        for t in triangles {
+            let corners = self.triangles[*t as usize].map(|v| {
+                *places.entry(v).or_insert_with(|| {
+                    some.vertices.push(self.vertices[v as usize]);
+                    some.vertices.len() as u32 - 1 // at most the old count, which was a u32
+                })
+            });
+            some.triangles.push(corners);
+        }
+        some
+    }
+
+    /// Appends another mesh, with vertices of its own.
+    pub(crate) fn append(&mut self, other: &Self) {
+        let first = self.vertices.len() as u32; // the caller sees to it that all have a number
+        self.vertices.extend(&other.vertices);
+        let moved = other.triangles.iter().map(|t| t.map(|v| first + v));
+        self.triangles.extend(moved);
+    }
+
     /// Merges vertices whose coordinates are exactly equal (+0 and -0 are equal), in order of first appearance.
     ///
     /// No tolerance: formats without indices repeat a corner's digits exactly, and a tolerance would close holes that

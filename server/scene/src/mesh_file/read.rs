@@ -84,32 +84,69 @@ pub(crate) struct MeshPart {
 /// The pieces of a mesh that have one of the names in `only`, all with none, and how the file says that they look: a material that cannot be read is no
 /// fault of the mesh. At least one of the names must be there.
 pub(crate) fn read_part(path: &Path, only: &[String]) -> Result<MeshPart, FileError> {
-    let bytes = mesh_bytes(path)?;
-    let Parsed {
-        mut mesh,
-        mut materials,
-        pieces,
-    } = parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path))?;
-    if extension(path) == "obj" {
-        materials.read_libraries(path.parent());
-        if materials.have_pictures() {
-            materials.coordinates = obj::coordinates_of_pictures(&bytes);
-        }
-    }
-    if !only.is_empty() {
-        let chosen = pieces.chosen(only);
-        if !chosen.contains(&true) {
-            let text = pieces.no_such(&only[0]);
-            return Err(Problem::of_file(path.display(), text).into());
-        }
-        let mut is_chosen = chosen.iter();
-        mesh.triangles
-            .retain(|_| is_chosen.next().is_some_and(|chosen| *chosen));
-        mesh = mesh.without_unused();
-        materials.keep(&chosen);
-    }
-    let look = materials.look(&mesh, path.parent());
+    let mut file = MeshFile::read(path)?;
+    let (mesh, look) = if only.is_empty() {
+        file.take_whole()
+    } else {
+        let chosen = file.pieces.chosen(only);
+        let part = file.parts([&chosen[..]]).next();
+        part.filter(|_| !chosen.is_empty()).ok_or_else(|| {
+            let text = file.pieces.no_such(&only[0]);
+            Problem::of_file(path.display(), text)
+        })?
+    };
+    let pieces = file.pieces;
     Ok(MeshPart { mesh, look, pieces })
+}
+
+/// Everything of a mesh file.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct MeshFile {
+    pub(crate) mesh: RawMesh,
+    materials: Materials,
+    pub(crate) pieces: Pieces,
+    /// Where pictures are.
+    directory: Option<PathBuf>,
+}
+
+impl MeshFile {
+    /// Reads a mesh and the libraries of materials beside it.
+    pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
+        let bytes = mesh_bytes(path)?;
+        let mut file = parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path))?;
+        file.read_beside(path, &bytes);
+        Ok(file)
+    }
+
+    /// Reads what materials look like, but for their pictures.
+    fn read_beside(&mut self, path: &Path, bytes: &[u8]) {
+        self.directory = path.parent().map(Path::to_path_buf);
+        self.materials.read_libraries(path.parent());
+        if extension(path) == "obj" && self.materials.have_pictures() {
+            self.materials.coordinates = obj::coordinates_of_pictures(bytes);
+        }
+    }
+
+    /// All triangles, which are gone from here then.
+    pub(crate) fn take_whole(&mut self) -> (RawMesh, FileLook) {
+        let materials = std::mem::take(&mut self.materials);
+        let look = materials.look(&self.mesh, self.directory.as_deref());
+        (std::mem::take(&mut self.mesh), look)
+    }
+
+    /// Sets of its triangles, each by itself, and how they look.
+    pub(crate) fn parts<'s>(
+        &'s self,
+        sets: impl IntoIterator<Item = &'s [u32]>,
+    ) -> impl Iterator<Item = (RawMesh, FileLook)> {
+        let of_triangles = self.materials.of_triangles();
+        sets.into_iter().map(move |triangles| {
+            let mesh = self.mesh.some(triangles);
+            let materials = self.materials.some(triangles, &of_triangles);
+            let look = materials.look(&mesh, self.directory.as_deref());
+            (mesh, look)
+        })
+    }
 }
 
 /// Names of the files that this mesh file is read with, relative to its folder, be they there or not: libraries of materials and their pictures, buffers.
@@ -177,14 +214,7 @@ fn unknown_format(path: &Path) -> &'static str {
     }
 }
 
-/// What a file holds.
-struct Parsed {
-    mesh: RawMesh,
-    materials: Materials,
-    pieces: Pieces,
-}
-
-fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<Parsed, Fault> {
+fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<MeshFile, Fault> {
     let (mut materials, mut pieces) = (Materials::default(), Pieces::default());
     let mesh = match extension(path).as_str() {
         "ply" => {
@@ -210,7 +240,7 @@ fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<Parsed, Fault> {
             "has no faces; export it as a triangle mesh".to_owned()
         }));
     }
-    Ok(Parsed {
+    Ok(MeshFile {
         mesh,
         materials,
         pieces,
@@ -263,7 +293,7 @@ mod tests {
             let bytes = [HEADS[head].as_bytes(), &tail].concat();
             for name in ["a.ply", "a.obj", "a.stl", "a.glb", "a.gltf"] {
                 for bytes in [&bytes, &tail] {
-                    let _ = parse_mesh(Path::new(name), bytes).map(|read| read.materials.look(&read.mesh, None));
+                    let _ = parse_mesh(Path::new(name), bytes).map(|read| read.materials.look(&read.mesh));
                 }
             }
         }
@@ -274,7 +304,7 @@ mod tests {
             let place = place % bytes.len();
             bytes[place] = value;
             bytes.truncate(bytes.len().saturating_sub(cut % 3));
-            if let Ok(Parsed { mesh, .. }) = parse_mesh(Path::new("a.ply"), &bytes) {
+            if let Ok(MeshFile { mesh, .. }) = parse_mesh(Path::new("a.ply"), &bytes) {
                 prop_assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < mesh.vertices.len()));
                 prop_assert!(mesh.vertices.iter().all(|v| v.iter().all(|c| c.is_finite())));
             }
@@ -310,7 +340,7 @@ mod tests {
     fn colours_of_faces_are_said_not_to_be_drawn() {
         let lost = |name: &str, bytes: &[u8]| {
             let read = parse_mesh(Path::new(name), bytes).unwrap();
-            read.materials.look(&read.mesh, None).lost
+            read.materials.look(&read.mesh).lost
         };
         let plain = [&[0_u8; 80][..], &[1, 0, 0, 0], &[0; 50]].concat();
         assert_eq!(lost("a.stl", &plain), [""; 0]);

@@ -21,6 +21,7 @@ pub(crate) use edit::RESERVED_NAMES;
 pub(crate) use file_faults::file_faults;
 pub(crate) use load::unusable;
 pub use load::{Scene, SceneSource};
+pub(crate) use parse::MAX_OBSTACLES;
 pub(crate) use parse_mesh_file::LENGTH_UNITS;
 pub(crate) use parse_shape::pose_of;
 pub use prepared::{Prepared, Sources};

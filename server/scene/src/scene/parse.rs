@@ -19,7 +19,7 @@ use crate::fidelity::spec::fidelity;
 use crate::problem::FileError;
 
 /// Most obstacles: the method counts them in 16 bits.
-const MAX_OBSTACLES: usize = 1 << 16;
+pub(crate) const MAX_OBSTACLES: usize = 1 << 16;
 
 /// What a scene file says.
 #[derive(Clone, Debug, PartialEq)]

@@ -186,7 +186,7 @@ fn an_imported_part_is_seen_with_the_looks_of_its_file() {
     folder.gltf("a.gltf", &format!("{STEEL},{RED}"), "");
     let made = folder.0.path().join("made");
     let report = import(&ImportRequest {
-        parts: vec![folder.0.path().join("a.gltf")],
+        parts: vec![folder.0.path().join("a.gltf").into()],
         folder: made.clone(),
         ..ImportRequest::default()
     });
@@ -233,7 +233,7 @@ fn a_part_that_import_turned_is_drawn_as_it_is_felt() {
     }
     folder.write("a.mtl", "newmtl m0\nKd 1 0 0\nnewmtl m1\nKd 0 1 0\n");
     let report = import(&ImportRequest {
-        parts: vec![folder.write("a.obj", text)],
+        parts: vec![folder.write("a.obj", text).into()],
         folder: folder.0.path().join("made"),
         unit: Some("m".parse().unwrap()),
         ..ImportRequest::default()
@@ -423,7 +423,7 @@ fn an_import_writes_the_look_of_its_parts_into_the_scene() {
     let folder = Folder::new();
     folder.gltf("a.gltf", &format!("{RED},{RED}"), "");
     let report = import(&ImportRequest {
-        parts: vec![folder.0.path().join("a.gltf")],
+        parts: vec![folder.0.path().join("a.gltf").into()],
         folder: folder.0.path().join("out"),
         ..ImportRequest::default()
     })

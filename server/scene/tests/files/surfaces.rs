@@ -116,7 +116,7 @@ fn a_lobe_that_is_inside_out_is_a_fault_with_its_place() {
         let part = folder.path().join("a.ply");
         std::fs::write(&part, write_ply(&mesh)).unwrap();
         let request = ImportRequest {
-            parts: vec![part],
+            parts: vec![part.into()],
             folder: folder.path().join("out"),
             obstacles_only: true,
             ..ImportRequest::default()

@@ -14,7 +14,7 @@ pub(crate) fn run(case: &Case, folder: &Path) -> (PathBuf, Result<ImportReport, 
     std::fs::write(&file, &case.bytes).unwrap();
     let out = folder.join(format!("{}.out", case.file));
     let mut request = ImportRequest {
-        parts: vec![file],
+        parts: vec![file.into()],
         folder: out.clone(),
         ..ImportRequest::default()
     };
@@ -69,7 +69,7 @@ fn misjudged(
     out: &Path,
     report: &ImportReport,
 ) -> Option<String> {
-    let found: Vec<&str> = report.parts[0].findings.iter().map(|f| f.kind).collect();
+    let found: Vec<&str> = report.parts[0].all_findings().map(|f| f.kind).collect();
     if found != kinds {
         return Some(format!("findings {found:?}\n{report}"));
     }
@@ -87,8 +87,8 @@ fn misjudged(
         return Some(format!("volumes {:?}, expected {volume}", verdict.volumes));
     }
     let part = &report.parts[0];
-    let bound = part.moved_m
-        + part.thickened_m.unwrap_or(0.0)
+    let bound = part.moved_m()
+        + part.sources[0].thickened_m.unwrap_or(0.0)
         + part.simplified_m.unwrap_or(0.0)
         + case.error;
     // Far parts were moved to the origin.
@@ -109,9 +109,9 @@ fn misjudged(
         ));
     }
     // What the file itself holds is no farther away than was said, unless it was taken out or all was moved.
-    let unit: LengthUnit = part.unit.parse().unwrap();
+    let unit: LengthUnit = part.sources[0].unit.parse().unwrap();
     let file = soup_of(
-        &taut_scene::read_mesh(Path::new(&part.file))
+        &taut_scene::read_mesh(Path::new(&part.sources[0].file))
             .unwrap()
             .scaled(unit.metres),
     );

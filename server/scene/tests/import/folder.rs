@@ -23,7 +23,7 @@ impl Parts {
 
     fn request(&self, names: &[&str]) -> ImportRequest {
         ImportRequest {
-            parts: names.iter().map(|name| self.path(name)).collect(),
+            parts: names.iter().map(|name| self.path(name).into()).collect(),
             folder: self.path("out"),
             ..ImportRequest::default()
         }
@@ -271,8 +271,7 @@ fn a_place_is_told_in_metres_of_the_part() {
     let parts = Parts::new(&[("a.ply", &overlapping)]);
     let report = import(&parts.request(&["a.ply"])).unwrap();
     let finding = report.parts[0]
-        .findings
-        .iter()
+        .all_findings()
         .find(|f| f.kind == "meets-itself")
         .unwrap();
     // The boxes meet along the outline of [0, 0.03] x [0, 0.02] x [0, 0.01].

@@ -27,8 +27,7 @@ fn table() -> String {
         let said = match (&case.expected, outcome) {
             (Expected::Imported { .. }, Ok(report)) => {
                 let findings: Vec<String> = report.parts[0]
-                    .findings
-                    .iter()
+                    .all_findings()
                     .map(|f| f.text.clone())
                     .collect();
                 if findings.is_empty() {

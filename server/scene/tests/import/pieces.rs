@@ -57,7 +57,7 @@ fn imported(name: &str, bytes: impl AsRef<[u8]>, only: &[&str]) -> Result<Import
 
 fn request(parts: Vec<PathBuf>, folder: PathBuf, only: &[&str]) -> ImportRequest {
     ImportRequest {
-        parts,
+        parts: parts.into_iter().map(Into::into).collect(),
         folder,
         only: only.iter().map(|name| (*name).to_owned()).collect(),
         obstacles_only: true,

@@ -54,7 +54,7 @@ fn imported(
     let part = folder.path().join(file);
     std::fs::write(&part, bytes).unwrap();
     let request = ImportRequest {
-        parts: vec![part],
+        parts: vec![part.into()],
         folder: folder.path().join("out"),
         thicken,
         close_holes,

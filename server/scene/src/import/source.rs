@@ -1,0 +1,190 @@
+//! A file of an import, or a piece of one: read, in its unit, repaired.
+
+use std::path::Path;
+
+use super::UpAxis;
+use super::repair::{Repaired, Wishes, is_single, repair};
+use super::report::{Finding, Places, SourceReport};
+use super::request::{ImportPart, ImportRequest};
+use super::unit::unit_of;
+use crate::mesh_file::{FileLook, MeshFile, Pieces, RawMesh};
+use crate::problem::{FileError, Problem};
+use crate::progress::Progress;
+use crate::scene::MAX_OBSTACLES;
+
+/// What a body is made of.
+pub(super) struct Source {
+    pub(super) report: SourceReport,
+    /// Closed, m, as it lies in the file.
+    pub(super) mesh: RawMesh,
+    /// The surface as it was in the file, m, if it has several looks and its faces are seen from the same sides still.
+    pub(super) as_read: Option<RawMesh>,
+    pub(super) look: FileLook,
+    pub(super) up: Option<UpAxis>,
+}
+
+/// A file that was read, and nothing done to it.
+pub(super) struct Read {
+    path: std::path::PathBuf,
+    file: MeshFile,
+}
+
+impl Read {
+    pub(super) fn of(path: &Path) -> Result<Self, FileError> {
+        Ok(Self {
+            path: path.to_path_buf(),
+            file: MeshFile::read(path)?,
+        })
+    }
+
+    /// Whether it has a piece of this name.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.file.pieces.has(name)
+    }
+
+    /// The chosen pieces as one. A file that names no pieces is taken whole, whichever were chosen.
+    pub(super) fn joined(
+        mut self,
+        part: &ImportPart,
+        request: &ImportRequest,
+    ) -> Result<Source, FileError> {
+        let only = &request.only;
+        let pieces = std::mem::take(&mut self.file.pieces);
+        let (mesh, look) = if only.is_empty() || pieces.names().is_empty() {
+            self.file.take_whole()
+        } else {
+            let chosen = pieces.chosen(only);
+            let some = self.file.parts([&chosen[..]]).next();
+            some.filter(|_| !chosen.is_empty())
+                .ok_or_else(|| Problem::of_file(self.path.display(), pieces.no_such(&only[0])))?
+        };
+        let told = told_of_file(&pieces, only);
+        source((mesh, look), None, told, part, request)
+    }
+
+    /// The chosen pieces, each by itself, with what it is called.
+    pub(super) fn split(
+        self,
+        part: &ImportPart,
+        request: &ImportRequest,
+    ) -> Result<Vec<(String, Result<Source, FileError>)>, FileError> {
+        let Self { path, file } = self;
+        let fail = |text: String| FileError::from(Problem::of_file(path.display(), text));
+        let is_named = !file.pieces.names().is_empty();
+        let only = if is_named { &request.only[..] } else { &[] };
+        let apart = file.pieces.apart(only);
+        if let (true, Some(first)) = (apart.is_empty(), only.first()) {
+            return Err(fail(file.pieces.no_such(first)));
+        }
+        if apart.len() > MAX_OBSTACLES {
+            return Err(fail(format!(
+                "has {} pieces, but a scene holds {MAX_OBSTACLES} bodies; leave --split out, or choose some with --only",
+                apart.len()
+            )));
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let parts = file.parts(apart.iter().map(|(_, triangles)| &triangles[..]));
+        let left_out = file.pieces.left_out().iter();
+        let mut told: Vec<Finding> = left_out.map(|text| left_out_finding(text)).collect();
+        let source = |(what, (name, _)): (_, &(Option<&str>, Vec<u32>))| {
+            let told = std::mem::take(&mut told);
+            let called = name.map_or_else(|| stem.clone().into_owned(), str::to_owned);
+            (
+                called,
+                source(what, name.filter(|_| is_named), told, part, request),
+            )
+        };
+        Ok(parts.zip(&apart).map(source).collect())
+    }
+}
+
+/// Repairs what was read of a file, or of its piece of this name.
+fn source(
+    (mesh, look): (RawMesh, FileLook),
+    piece: Option<&str>,
+    mut findings: Vec<Finding>,
+    part: &ImportPart,
+    request: &ImportRequest,
+) -> Result<Source, FileError> {
+    let path = &part.path;
+    let of_file = |text: String| match piece {
+        None => Problem::of_file(path.display(), text),
+        Some(name) => Problem::of_file(
+            path.display(),
+            format!("its piece \"{name}\", by itself as --split has it, {text}"),
+        ),
+    };
+    let as_read = (!look.parts.is_empty()).then(|| mesh.clone());
+    // A vertex of no triangle is no part of the surface, however far away it is.
+    let raw = mesh.without_unused();
+    let (unit, unit_assumed) = unit_of(path, &raw, request.unit_of(part))
+        .map_err(|text| FileError::from(of_file(text)))?;
+    let single = is_single(&raw.vertices);
+    let (file, count) = (path.display(), raw.triangles.len());
+    let progress = Progress::on_triangles(count, format_args!("{file}: mending {count} triangles"));
+    let wishes = Wishes {
+        close_holes: request.close_holes,
+        thicken: request.thicken,
+    };
+    let Repaired {
+        mesh,
+        findings: repairs,
+        moved,
+        thickened,
+    } = repair(raw.scaled(unit.metres), single, wishes)
+        .map_err(|faults| FileError::of_all(faults.into_iter().map(of_file).collect()))?;
+    drop(progress);
+    // A face that was turned, or that has a back now, would be seen from its wrong side in the surface of the file.
+    let turned = |finding: &Finding| finding.kind == "triangles-turned";
+    let faces_as_before = thickened.is_none() && !repairs.iter().any(turned);
+    findings.extend(repairs);
+    Ok(Source {
+        report: SourceReport {
+            file: path.display().to_string(),
+            piece: piece.map(str::to_owned),
+            unit: unit.name,
+            unit_assumed,
+            findings,
+            moved_m: moved,
+            thickened_m: thickened,
+        },
+        mesh,
+        as_read: as_read
+            .filter(|_| faces_as_before)
+            .map(|mesh| mesh.scaled(unit.metres)),
+        look,
+        up: request.up_of(part),
+    })
+}
+
+/// Which pieces of the file are the body, and what of the file is none.
+fn told_of_file(pieces: &Pieces, only: &[String]) -> Vec<Finding> {
+    let mut told = Vec::new();
+    let count = pieces.names().len();
+    if count > 1 {
+        let text = if only.is_empty() {
+            format!(
+                "joined its {count} pieces in one body: {}; --only takes some, --split makes a body of each",
+                pieces.listed()
+            )
+        } else {
+            let names: Vec<String> = only
+                .iter()
+                .filter(|name| pieces.has(name))
+                .map(|name| format!("\"{name}\""))
+                .collect();
+            format!(
+                "took only {} of its {count} pieces: {}",
+                names.join(", "),
+                pieces.listed()
+            )
+        };
+        told.push(Finding::new("pieces", &Places::of(count, None), text));
+    }
+    told.extend(pieces.left_out().iter().map(|text| left_out_finding(text)));
+    told
+}
+
+fn left_out_finding(text: &str) -> Finding {
+    Finding::new("left-out", &Places::of(1, None), text)
+}
