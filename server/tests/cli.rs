@@ -399,6 +399,62 @@ fn import_makes_a_scene_or_says_what_to_write() {
     );
 }
 
+#[test]
+fn import_joins_files_of_their_own_units_and_splits_pieces() {
+    let place = Workplace::new();
+    let tetrahedron = |x: f64| {
+        format!(
+            "v {x} 0 0\nv {} 0 0\nv {x} 30 0\nv {x} 0 30\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+            x + 30.0
+        )
+    };
+    place.write("a.obj", &tetrahedron(0.0));
+    place.write("b.obj", &format!("g pin\n{}", tetrahedron(-40.0)));
+    let (a, b, out) = (place.text("a.obj"), place.text("b.obj"), place.text("out"));
+    let [in_a, in_b] = [&a, &b].map(|file| format!("both={file}"));
+    let words = [
+        "import", &in_a, &in_b, "--out", &out, "--json", "--unit", "mm",
+    ];
+    let parts = |words: &[&str]| {
+        let output = taut(words);
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        report["parts"].as_array().cloned().unwrap_or_default()
+    };
+    refused(
+        &[&words[..], &["--unit", "c.obj=inch"]].concat(),
+        &["--unit: names c.obj, but no part is called so"],
+    );
+    refused(
+        &[&words[..], &["--unit", "cm"]].concat(),
+        &["--unit: is written with two values for all parts"],
+    );
+    let joined = parts(&[&words[..], &["--unit", "b.obj=cm"]].concat());
+    assert_eq!(joined.len(), 1);
+    let units = [0, 1].map(|k| joined[0]["sources"][k]["unit"].clone());
+    assert_eq!(units, ["mm", "cm"]);
+    let volume = joined[0]["mesh"]["volume_m3"].as_f64().unwrap_or_default();
+    let expected = 0.03_f64.powi(3) / 6.0 * 1001.0;
+    assert!((volume / expected - 1.0).abs() < 1e-9, "{volume}");
+    let out = place.text("split");
+    let split = parts(&[
+        "import",
+        &a,
+        &b,
+        "--out",
+        &out,
+        "--json",
+        "--unit",
+        "mm",
+        "--split",
+        "--obstacle",
+    ]);
+    let bodies: Vec<&str> = split
+        .iter()
+        .filter_map(|part| part["body"].as_str())
+        .collect();
+    assert_eq!(bodies, ["a", "pin"]);
+}
+
 #[cfg(feature = "render")]
 #[test]
 fn a_preview_that_cannot_be_is_refused_before_anything_is_written() {

@@ -62,18 +62,21 @@ impl Read {
         source((mesh, look), None, told, part, request)
     }
 
-    /// The chosen pieces, each by itself, with what it is called.
+    /// The chosen pieces, each by itself, with what it is called. A file that names no pieces is one.
     pub(super) fn split(
         self,
         part: &ImportPart,
         request: &ImportRequest,
     ) -> Result<Vec<(String, Result<Source, FileError>)>, FileError> {
+        let stem = self.path.file_stem().unwrap_or_default();
+        let stem = stem.to_string_lossy().into_owned();
+        if self.file.pieces.names().is_empty() {
+            return Ok(vec![(stem, self.joined(part, request))]);
+        }
         let Self { path, file } = self;
         let fail = |text: String| FileError::from(Problem::of_file(path.display(), text));
-        let is_named = !file.pieces.names().is_empty();
-        let only = if is_named { &request.only[..] } else { &[] };
-        let apart = file.pieces.apart(only);
-        if let (true, Some(first)) = (apart.is_empty(), only.first()) {
+        let apart = file.pieces.apart(&request.only);
+        if let (true, Some(first)) = (apart.is_empty(), request.only.first()) {
             return Err(fail(file.pieces.no_such(first)));
         }
         if apart.len() > MAX_OBSTACLES {
@@ -82,17 +85,13 @@ impl Read {
                 apart.len()
             )));
         }
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let parts = file.parts(apart.iter().map(|(_, triangles)| &triangles[..]));
         let left_out = file.pieces.left_out().iter();
         let mut told: Vec<Finding> = left_out.map(|text| left_out_finding(text)).collect();
         let source = |(what, (name, _)): (_, &(Option<&str>, Vec<u32>))| {
             let told = std::mem::take(&mut told);
-            let called = name.map_or_else(|| stem.clone().into_owned(), str::to_owned);
-            (
-                called,
-                source(what, name.filter(|_| is_named), told, part, request),
-            )
+            let called = name.unwrap_or(&stem).to_owned();
+            (called, source(what, *name, told, part, request))
         };
         Ok(parts.zip(&apart).map(source).collect())
     }

@@ -3,6 +3,7 @@
 mod awkward;
 mod cases;
 mod folder;
+mod joined;
 mod judge;
 mod page;
 mod pieces;
