@@ -45,6 +45,11 @@ impl Progress {
                 watcher: None,
             };
         }
+        Self::of(what)
+    }
+
+    /// Begins work of this name that may be long.
+    pub(crate) fn of(what: impl fmt::Display) -> Self {
         Self::watched(what.to_string(), SILENT_TIME, |line| {
             // Who does not listen misses nothing that he needs.
             let _ = writeln!(std::io::stderr(), "{line}");

@@ -128,7 +128,7 @@ pub struct ImportArgs {
     /// Close holes of at most this many edges (default: 16, if a hole is below 1 % of its surface; none with --thicken)
     #[arg(long, value_name = "EDGES", value_parser = hole_edges, allow_negative_numbers = true)]
     pub close_holes: Option<usize>,
-    /// Make open sheets solids of this thickness (default: sheets are refused)
+    /// Make open sheets and points without faces (.ply, .obj, .xyz, .asc, .pts, .csv, .txt, .pcd) solids of this thickness (default: they are refused)
     #[arg(long, value_name = "METRES", value_parser = positive_length, allow_negative_numbers = true)]
     pub thicken: Option<f64>,
     /// Take only this node, object or group of files that name any, and all that is part of it; may be repeated (default: all, as one body)

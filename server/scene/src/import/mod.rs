@@ -3,16 +3,19 @@
 //! Every repair moves a point by at most a stated distance, or is refused. What cannot be repaired is said with its place; nothing is written then.
 
 mod body;
+mod cloud;
 mod edges;
 mod faces;
 mod folder;
 mod hand_path;
 mod holes;
+mod lattice;
 mod looks;
 mod manifold;
 mod names;
 mod orientation;
 mod placing;
+mod point_tree;
 mod repair;
 mod report;
 mod request;
@@ -141,7 +144,7 @@ fn sources_of<'r>(
     found: &mut HashSet<&'r String>,
 ) -> Vec<(String, Result<Vec<Source>, FileError>)> {
     let mut read = |part: &ImportPart| {
-        let read = Read::of(&part.path)?;
+        let read = Read::of(&part.path, request.thicken.is_some())?;
         found.extend(request.only.iter().filter(|name| read.has(name)));
         Ok::<Read, FileError>(read)
     };

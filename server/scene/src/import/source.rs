@@ -3,10 +3,13 @@
 use std::path::Path;
 
 use super::UpAxis;
+use super::cloud::{ERROR_SHARE, MAX_SITES, Shell, shell};
+use super::edges::components;
 use super::repair::{Repaired, Wishes, is_single, repair};
 use super::report::{Finding, Places, SourceReport};
 use super::request::{ImportPart, ImportRequest};
-use super::unit::unit_of;
+use super::unit::{LengthUnit, unit_of};
+use super::weld;
 use crate::mesh_file::{FileLook, MeshFile, Pieces, RawMesh};
 use crate::problem::{FileError, Problem};
 use crate::progress::Progress;
@@ -30,11 +33,19 @@ pub(super) struct Read {
 }
 
 impl Read {
-    pub(super) fn of(path: &Path) -> Result<Self, FileError> {
-        Ok(Self {
-            path: path.to_path_buf(),
-            file: MeshFile::read(path)?,
-        })
+    /// A file without faces is taken where `points` are.
+    pub(super) fn of(path: &Path, points: bool) -> Result<Self, FileError> {
+        let file = MeshFile::read_with_points(path)?;
+        let is_cloud = file.mesh.triangles.is_empty() && !file.mesh.vertices.is_empty();
+        match file.lacks_faces() {
+            Some(text) if !(points && is_cloud) => {
+                Err(Problem::of_file(path.display(), text).into())
+            }
+            _ => Ok(Self {
+                path: path.to_path_buf(),
+                file,
+            }),
+        }
     }
 
     /// Whether it has a piece of this name.
@@ -113,47 +124,130 @@ fn source(
             format!("its piece \"{name}\", by itself as --split has it, {text}"),
         ),
     };
+    let faults = |texts: Vec<String>| FileError::of_all(texts.into_iter().map(of_file).collect());
     let as_read = (!look.parts.is_empty()).then(|| mesh.clone());
-    // A vertex of no triangle is no part of the surface, however far away it is.
-    let raw = mesh.without_unused();
-    let (unit, unit_assumed) = unit_of(path, &raw, request.unit_of(part))
-        .map_err(|text| FileError::from(of_file(text)))?;
-    let single = is_single(&raw.vertices);
-    let (file, count) = (path.display(), raw.triangles.len());
-    let progress = Progress::on_triangles(count, format_args!("{file}: mending {count} triangles"));
-    let wishes = Wishes {
-        close_holes: request.close_holes,
-        thicken: request.thicken,
-    };
-    let Repaired {
-        mesh,
-        findings: repairs,
-        moved,
-        thickened,
-    } = repair(raw.scaled(unit.metres), single, wishes)
-        .map_err(|faults| FileError::of_all(faults.into_iter().map(of_file).collect()))?;
-    drop(progress);
+    let made = Made::of(mesh, part, request).map_err(faults)?;
     // A face that was turned, or that has a back now, would be seen from its wrong side in the surface of the file.
     let turned = |finding: &Finding| finding.kind == "triangles-turned";
-    let faces_as_before = thickened.is_none() && !repairs.iter().any(turned);
-    findings.extend(repairs);
+    let faces_as_before = made.thickened.is_none() && !made.findings.iter().any(turned);
+    findings.extend(made.findings);
     Ok(Source {
         report: SourceReport {
             file: path.display().to_string(),
             piece: piece.map(str::to_owned),
-            unit: unit.name,
-            unit_assumed,
+            unit: made.unit.name,
+            unit_assumed: made.unit_assumed,
             findings,
-            moved_m: moved,
-            thickened_m: thickened,
+            moved_m: made.moved,
+            thickened_m: made.thickened,
         },
-        mesh,
+        mesh: made.mesh,
         as_read: as_read
             .filter(|_| faces_as_before)
-            .map(|mesh| mesh.scaled(unit.metres)),
+            .map(|mesh| mesh.scaled(made.unit.metres)),
         look,
         up: request.up_of(part),
     })
+}
+
+/// A closed surface made of what a file holds.
+struct Made {
+    unit: LengthUnit,
+    unit_assumed: bool,
+    mesh: RawMesh,
+    findings: Vec<Finding>,
+    moved: f64,
+    thickened: Option<f64>,
+}
+
+impl Made {
+    fn of(mesh: RawMesh, part: &ImportPart, request: &ImportRequest) -> Result<Self, Vec<String>> {
+        let (path, is_cloud) = (&part.path, mesh.triangles.is_empty());
+        // A vertex of no triangle is no part of the surface, however far away it is.
+        let raw = if is_cloud {
+            mesh
+        } else {
+            mesh.without_unused()
+        };
+        let around = request.thicken.filter(|_| is_cloud).unwrap_or_default();
+        let (unit, unit_assumed) =
+            unit_of(path, &raw, request.unit_of(part), around).map_err(|text| vec![text])?;
+        let (single, file) = (is_single(&raw.vertices), path.display());
+        let raw = raw.scaled(unit.metres);
+        if let (true, Some(thickness)) = (is_cloud, request.thicken) {
+            let (mesh, finding, farthest) = shelled(&raw, single, thickness, &part.path)?;
+            return Ok(Self {
+                unit,
+                unit_assumed,
+                mesh,
+                findings: vec![finding],
+                moved: 0.0,
+                thickened: Some(farthest),
+            });
+        }
+        let count = raw.triangles.len();
+        let progress =
+            Progress::on_triangles(count, format_args!("{file}: mending {count} triangles"));
+        let wishes = Wishes {
+            close_holes: request.close_holes,
+            thicken: request.thicken,
+        };
+        let repaired = repair(raw, single, wishes);
+        drop(progress);
+        let Repaired {
+            mesh,
+            findings,
+            moved,
+            thickened,
+        } = repaired?;
+        Ok(Self {
+            unit,
+            unit_assumed,
+            mesh,
+            findings,
+            moved,
+            thickened,
+        })
+    }
+}
+
+/// A shell around points, what to say of it, and how far its surface is from the nearest of them at most, m.
+fn shelled(
+    cloud: &RawMesh,
+    single: bool,
+    thickness: f64,
+    path: &Path,
+) -> Result<(RawMesh, Finding, f64), Vec<String>> {
+    let (count, file) = (cloud.vertices.len(), path.display());
+    let (rounding, error) = (weld::rounding(cloud, single), ERROR_SHARE * thickness);
+    let readable = rounding <= error; // false for NaN
+    if !readable {
+        return Err(vec![format!(
+            "has points that are good to {rounding:.3e} m only, since they lie so far from the origin, but a shell of {thickness} m follows them within {error:.3e} m; move them near to the origin in double precision, or write a larger --thicken"
+        )]);
+    }
+    let progress = Progress::of(format_args!("{file}: a shell around {count} points"));
+    let Shell {
+        mesh,
+        distances: [least, most],
+    } = shell(&cloud.vertices, thickness, MAX_SITES, &progress).map_err(|text| vec![text])?;
+    let parts = components(&mesh.triangles).len();
+    // V - E + F is 2 for a ball, and 2 less for each handle.
+    let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
+    let handles = (2 * parts + triangles / 2).saturating_sub(vertices) / 2;
+    let mut text = format!(
+        "made a shell around {count} points: its surface is {least:.3e} to {most:.3e} m from the nearest of them, in {parts} closed parts"
+    );
+    if handles > 0 {
+        text += &format!(
+            "; {handles} gaps between points go through it: a larger --thicken closes them if they are not meant"
+        );
+    }
+    Ok((
+        mesh,
+        Finding::new("shelled", &Places::of(parts, None), text),
+        most,
+    ))
 }
 
 /// Which pieces of the file are the body, and what of the file is none.

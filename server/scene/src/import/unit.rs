@@ -44,11 +44,12 @@ const SIZES: [f64; 2] = [1e-6, 1e5];
 
 /// The unit of a part, and whether nobody named it; or a sentence that says what to write.
 ///
-/// glTF is in metres. Other files are in the `named` unit; without one in metres, if that is a size that a hand can hold.
+/// A shell `around` it, m, makes the part larger. glTF is in metres. Other files are in the `named` unit; without one in metres, if that is a size that a hand can hold.
 pub(super) fn unit_of(
     path: &Path,
     mesh: &RawMesh,
     named: Option<LengthUnit>,
+    around: f64,
 ) -> Result<(LengthUnit, bool), String> {
     let longest = mesh.bounds().map_or(0.0, |(low, high)| (high - low).max());
     let (unit, assumed) = match named {
@@ -56,14 +57,14 @@ pub(super) fn unit_of(
         Some(unit) => (unit, false),
         None => (LengthUnit::METRE, true),
     };
-    if assumed && is_doubtful(longest) {
+    if assumed && is_doubtful(longest + around) {
         return Err(format!(
             "names no unit, and its longest side is {}: nothing for a hand if that is in metres; {}",
             short(longest),
             advice(longest)
         ));
     }
-    let size = longest * unit.metres;
+    let size = longest * unit.metres + around;
     let [least, most] = SIZES;
     if (least..=most).contains(&size) {
         Ok((unit, assumed))

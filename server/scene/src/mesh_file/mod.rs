@@ -13,6 +13,7 @@ mod obj;
 mod picture_use;
 mod pieces;
 mod ply;
+mod points;
 mod polygon;
 mod raw_mesh;
 mod read;

@@ -5,9 +5,12 @@ use std::path::{Component, Path, PathBuf};
 use super::material::{FileLook, Materials};
 use super::picture_use::PictureSource;
 use super::pieces::Pieces;
-use super::{RawMesh, gltf, gltf_container, mtl, obj, ply, stl};
+use super::{RawMesh, gltf, gltf_container, mtl, obj, ply, points, stl};
 use crate::files::{MAX_MESH_BYTES, read_bytes};
 use crate::problem::{FileError, Problem};
+
+/// Endings of files that hold points and no faces. `taut import` alone reads them.
+const POINT_ENDINGS: [&str; 6] = ["xyz", "asc", "pts", "csv", "txt", "pcd"];
 
 /// What is wrong with a mesh's bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -120,10 +123,34 @@ impl MeshFile {
 
     /// Reads what materials look like, but for their pictures.
     fn read_beside(&mut self, path: &Path, bytes: &[u8]) {
-        self.directory = path.parent().map(Path::to_path_buf);
-        self.materials.read_libraries(path.parent());
+        self.materials.read_libraries(self.directory.as_deref());
         if extension(path) == "obj" && self.materials.have_pictures() {
             self.materials.coordinates = obj::coordinates_of_pictures(bytes);
+        }
+    }
+
+    /// The same of a file that may hold nothing but points: those of a mesh format, or one of points.
+    pub(crate) fn read_with_points(path: &Path) -> Result<Self, FileError> {
+        let is_points = || POINT_ENDINGS.contains(&extension(path).as_str());
+        let bytes = if !path.is_dir() && is_points() {
+            read_bytes(path, MAX_MESH_BYTES)?
+        } else {
+            mesh_bytes(path)?
+        };
+        let mut file = parse_file(path, &bytes).map_err(|fault| fault.in_file(path))?;
+        file.read_beside(path, &bytes);
+        Ok(file)
+    }
+
+    /// Why a file without faces is no mesh; `None` of one with some.
+    pub(crate) fn lacks_faces(&self) -> Option<String> {
+        let points = self.mesh.vertices.len();
+        match (self.mesh.triangles.len(), points) {
+            (1.., _) => None,
+            (0, 0) => Some("has no faces; export it as a triangle mesh".to_owned()),
+            (0, _) => Some(format!(
+                "has no faces, only {points} points: `taut import --thicken` makes a shell around them, of a thickness in metres above the gaps between them; or reconstruct a surface (in MeshLab: Filters, Remeshing, Screened Poisson), and export that"
+            )),
         }
     }
 
@@ -210,11 +237,20 @@ fn unknown_format(path: &Path) -> &'static str {
         "step" | "stp" | "iges" | "igs" => {
             "holds surfaces as formulas (STEP, IGES), which are not read; export the part as STL, OBJ or glTF from the CAD program, with the tolerance that may be felt (FreeCAD: Mesh Design, Meshes, Create mesh from shape, then File, Export)"
         }
+        ending if POINT_ENDINGS.contains(&ending) => {
+            "holds points and no faces; `taut import --thicken` makes a mesh of them, a shell around the points"
+        }
         _ => "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf",
     }
 }
 
 fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<MeshFile, Fault> {
+    let file = parse_file(path, bytes)?;
+    file.lacks_faces()
+        .map_or(Ok(file), |text| Err(Fault::new(text)))
+}
+
+fn parse_file(path: &Path, bytes: &[u8]) -> Result<MeshFile, Fault> {
     let (mut materials, mut pieces) = (Materials::default(), Pieces::default());
     let mesh = match extension(path).as_str() {
         "ply" => {
@@ -228,22 +264,22 @@ fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<MeshFile, Fault> {
             stl::parse(bytes, &mut pieces)
         }
         "glb" | "gltf" => gltf::parse(bytes, path.parent(), &mut materials, &mut pieces),
+        "pcd" => points::parse_pcd(bytes).map(|(mesh, without_return)| {
+            if without_return > 0 {
+                pieces.left_out.push(format!(
+                    "left out {without_return} points without a return: their coordinates are no numbers"
+                ));
+            }
+            mesh
+        }),
+        ending if POINT_ENDINGS.contains(&ending) => points::parse(bytes),
         _ => Err(Fault::new(unknown_format(path))),
     }?;
-    if mesh.triangles.is_empty() {
-        let points = mesh.vertices.len();
-        return Err(Fault::new(if points > 0 {
-            format!(
-                "has no faces, only {points} points: point clouds are not taken; reconstruct a surface from them first (in MeshLab: Filters, Remeshing, Screened Poisson), and export that"
-            )
-        } else {
-            "has no faces; export it as a triangle mesh".to_owned()
-        }));
-    }
     Ok(MeshFile {
         mesh,
         materials,
         pieces,
+        directory: path.parent().map(Path::to_path_buf),
     })
 }
 
@@ -293,7 +329,7 @@ mod tests {
             let bytes = [HEADS[head].as_bytes(), &tail].concat();
             for name in ["a.ply", "a.obj", "a.stl", "a.glb", "a.gltf"] {
                 for bytes in [&bytes, &tail] {
-                    let _ = parse_mesh(Path::new(name), bytes).map(|read| read.materials.look(&read.mesh));
+                    let _ = parse_mesh(Path::new(name), bytes).map(|read| read.materials.look(&read.mesh, None));
                 }
             }
         }
@@ -340,7 +376,7 @@ mod tests {
     fn colours_of_faces_are_said_not_to_be_drawn() {
         let lost = |name: &str, bytes: &[u8]| {
             let read = parse_mesh(Path::new(name), bytes).unwrap();
-            read.materials.look(&read.mesh).lost
+            read.materials.look(&read.mesh, None).lost
         };
         let plain = [&[0_u8; 80][..], &[1, 0, 0, 0], &[0; 50]].concat();
         assert_eq!(lost("a.stl", &plain), [""; 0]);

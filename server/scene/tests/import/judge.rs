@@ -74,6 +74,19 @@ fn six_volumes([a, b, c]: &Triangle) -> f64 {
     dot(*a, cross(*b, *c))
 }
 
+/// How often the surface goes around a place: 1 in a solid, 0 outside.
+///
+/// Source: A. Van Oosterom, J. Strackee, *The Solid Angle of a Plane Triangle*, IEEE TBME 30, 1983.
+pub(crate) fn winding(surface: &Soup, place: Point) -> f64 {
+    let angle = |t: &Triangle| {
+        let [a, b, c] = t.map(|p| minus(p, place));
+        let [la, lb, lc] = [a, b, c].map(|v| dot(v, v).sqrt());
+        let below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+        2.0 * dot(a, cross(b, c)).atan2(below)
+    };
+    surface.iter().map(angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
 /// Largest distance of a set of points of `from` to the triangles of `to`, each with each: below the true one-sided distance, and equal to
 /// it where a corner is the farthest point.
 pub(crate) fn one_sided(from: &Soup, to: &Soup) -> f64 {

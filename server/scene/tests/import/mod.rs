@@ -2,6 +2,7 @@
 
 mod awkward;
 mod cases;
+mod clouds;
 mod folder;
 mod joined;
 mod judge;

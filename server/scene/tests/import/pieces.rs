@@ -132,7 +132,7 @@ fn what_is_no_surface_is_refused_with_what_to_do() {
             draco.as_str(),
             "export it without Draco compression",
         ),
-        ("a.ply", points, "point clouds are not taken"),
+        ("a.ply", points, "`taut import --thicken` makes a shell"),
         (
             "a.step",
             "ISO-10303-21;",

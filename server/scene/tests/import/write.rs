@@ -73,6 +73,20 @@ pub(crate) fn ply_soup(soup: &Soup) -> Vec<u8> {
     ply_of(&vertices, &triangles)
 }
 
+/// No faces.
+pub(crate) fn ply_points(points: &[Point]) -> Vec<u8> {
+    let mut bytes = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nend_header\n",
+        points.len()
+    )
+    .into_bytes();
+    points
+        .iter()
+        .flatten()
+        .for_each(|c| bytes.extend(c.to_le_bytes()));
+    bytes
+}
+
 fn ply_of(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<u8> {
     let mut text = format!(
         "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",

@@ -1,5 +1,6 @@
 //! Awkward part files: what is in them, what is meant, and what `taut import` is expected to do.
 
+mod clouds;
 mod directions;
 mod files;
 mod openings;
@@ -92,6 +93,7 @@ pub(crate) fn cases() -> Vec<Case> {
         directions::directions(),
         openings::openings(),
         openings::contacts(),
+        clouds::clouds(),
         files::broken(),
     ]
     .into_iter()

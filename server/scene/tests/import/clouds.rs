@@ -1,0 +1,426 @@
+//! Points without faces as shells: closed, as far from the points as is promised, around all of them. Distances and sides are found each with each.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use taut_scene::{FileError, ImportReport, ImportRequest, import};
+
+use super::judge::{Verdict, judge, winding};
+use super::solids::{Noise, Point, Triangle, part, sheet};
+use super::write::{obj_soup, ply_points};
+
+fn import_as(
+    name: &str,
+    bytes: &[u8],
+    thicken: Option<f64>,
+    unit: Option<&str>,
+) -> Result<(ImportReport, Verdict), FileError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    let report = import(&ImportRequest {
+        parts: vec![path.into()],
+        folder: folder.path().join("out"),
+        unit: unit.map(|unit| unit.parse().unwrap()),
+        thicken,
+        ..ImportRequest::default()
+    })?;
+    let verdict = judge(&Path::new(&report.folder).join(&report.parts[0].mesh_file));
+    Ok((report, verdict))
+}
+
+fn apart(a: Point, b: Point) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+fn nearest(cloud: &[Point], place: Point) -> f64 {
+    let all = cloud.iter().map(|p| apart(*p, place));
+    all.fold(f64::INFINITY, f64::min)
+}
+
+/// A place of the triangle, by two numbers in [0, 1].
+fn within([a, b, c]: &Triangle, u: f64, v: f64) -> Point {
+    let (u, v) = if u + v > 1.0 {
+        (1.0 - u, 1.0 - v)
+    } else {
+        (u, v)
+    };
+    [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]))
+}
+
+/// What is promised of a shell of this thickness around a cloud; `way` is by how much it was moved to the origin, `rounding` how well that is known.
+fn judge_shell(
+    cloud: &[Point],
+    thickness: f64,
+    verdict: &Verdict,
+    (way, rounding): (Point, f64),
+    what: &str,
+) {
+    assert!(verdict.closed, "{what}");
+    let moved: Vec<Point> = cloud
+        .iter()
+        .map(|p| [0, 1, 2].map(|k| p[k] + way[k]))
+        .collect();
+    let (least, most) = (0.35 * thickness, 0.65 * thickness);
+    let mut noise = Noise::new();
+    let mut unit = || 0.5 + 0.5 * noise.next();
+    let step = (verdict.soup.len() / 700).max(1);
+    for triangle in verdict.soup.iter().step_by(step) {
+        let others = [
+            within(triangle, unit(), unit()),
+            within(triangle, unit(), unit()),
+        ];
+        for place in triangle.iter().copied().chain(others) {
+            let d = nearest(&moved, place);
+            let bounded = (least - rounding..=most + rounding).contains(&d);
+            assert!(bounded, "{what}: {d} m, not {least} to {most}");
+        }
+    }
+    // All that is nearer than that is inside, all that is farther outside.
+    let step = (moved.len() / 15).max(1);
+    let mut sides = [0; 2];
+    for point in moved.iter().step_by(step) {
+        assert!(
+            (winding(&verdict.soup, *point) - 1.0).abs() < 1e-6,
+            "{what}"
+        );
+        for _ in 0..6 {
+            let place = point.map(|c| c + 1.2 * thickness * (2.0 * unit() - 1.0));
+            let d = nearest(&moved, place);
+            let expected = match d {
+                d if d < least - rounding => 1.0,
+                d if d > most + rounding => 0.0,
+                _ => continue,
+            };
+            sides[expected as usize] += 1;
+            let found = winding(&verdict.soup, place);
+            assert!((found - expected).abs() < 1e-6, "{what}: {found} at {d} m");
+        }
+    }
+    assert!(sides[0] > 0 || moved.len() > 300, "{what}: {sides:?}");
+}
+
+/// Numbers in [-1, 1] for each of `count` points.
+fn random(count: usize, mut place: impl FnMut([f64; 3]) -> Point) -> Vec<Point> {
+    let mut noise = Noise::new();
+    (0..count)
+        .map(|_| place([noise.next(), noise.next(), noise.next()]))
+        .collect()
+}
+
+fn on_ball(p: [f64; 3], radius: f64) -> Point {
+    let length = p.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-9);
+    p.map(|c| radius * c / length)
+}
+
+/// Clouds, a thickness for each, and how many closed parts the shell has, where that is known.
+fn clouds() -> Vec<(&'static str, Vec<Point>, f64, Option<usize>)> {
+    let grid = |z: f64| -> Vec<Point> {
+        let cells = (0..12).flat_map(|i| (0..9).map(move |j| [i, j]));
+        cells
+            .map(|[i, j]| [f64::from(i) * 1e-3, f64::from(j) * 1e-3, z])
+            .collect()
+    };
+    let line = |way: Point| -> Vec<Point> {
+        (0..40)
+            .map(|k| way.map(|c| c * f64::from(k) * 1e-3))
+            .collect()
+    };
+    vec![
+        ("one point", vec![[0.01, -0.02, 0.03]], 5e-3, Some(1)),
+        (
+            "two points far apart",
+            vec![[0.0; 3], [0.05, 0.0, 0.0]],
+            5e-3,
+            Some(2),
+        ),
+        ("a line along an axis", line([1.0, 0.0, 0.0]), 4e-3, Some(1)),
+        ("a line across", line([0.3, -0.7, 0.55]), 4e-3, Some(1)),
+        (
+            "one point a hundred times",
+            vec![[0.02; 3]; 100],
+            5e-3,
+            Some(1),
+        ),
+        ("a plane", grid(0.0), 3e-3, Some(1)),
+        (
+            "a plane twice",
+            [grid(0.0), grid(0.0)].concat(),
+            3e-3,
+            Some(1),
+        ),
+        (
+            "two sheets farther apart than the shell is thick",
+            [grid(0.0), grid(5e-3)].concat(),
+            3e-3,
+            Some(2),
+        ),
+        (
+            "two sheets nearer than that",
+            [grid(0.0), grid(2e-3)].concat(),
+            3e-3,
+            Some(1),
+        ),
+        (
+            "two sheets that just touch",
+            [grid(0.0), grid(3e-3)].concat(),
+            3e-3,
+            None,
+        ),
+        (
+            "points farther apart than it is thick",
+            grid(0.0),
+            0.8e-3,
+            Some(108),
+        ),
+        ("points whose balls touch", grid(0.0), 1e-3, None),
+        (
+            "a ball's surface",
+            random(2000, |p| on_ball(p, 0.02)),
+            8e-3,
+            Some(2),
+        ),
+        ("noise", random(300, |p| p.map(|c| 0.01 * c)), 3e-3, None),
+        (
+            "noise on a plane",
+            random(600, |[x, y, z]| [0.01 * x, 0.01 * y, 5e-4 * z]),
+            3e-3,
+            None,
+        ),
+        (
+            "coordinates on the sites",
+            random(200, |p| p.map(|c| (c * 8.0).round() * 1e-3)),
+            4e-3,
+            None,
+        ),
+        (
+            "far from the origin",
+            random(400, |p| on_ball(p, 0.01).map(|c| c + 3e4)),
+            3e-3,
+            None,
+        ),
+    ]
+}
+
+#[test]
+fn a_shell_is_closed_and_as_far_from_the_points_as_is_said() {
+    for (what, cloud, thickness, parts) in clouds() {
+        let (report, verdict) =
+            import_as("a.ply", &ply_points(&cloud), Some(thickness), Some("m")).unwrap();
+        let first = report.parts[0].all_findings().next().unwrap();
+        assert_eq!(first.kind, "shelled", "{what}");
+        let far = moved_by(&report);
+        let rounding = if far.is_some() {
+            1e-5
+        } else {
+            1e-9 * thickness
+        };
+        let way = far.unwrap_or_default();
+        judge_shell(&cloud, thickness, &verdict, (way, rounding), what);
+        if let Some(parts) = parts {
+            assert_eq!(verdict.volumes.len(), parts, "{what}");
+            assert_eq!(first.count, parts, "{what}");
+        }
+        // A shell of a closed surface has a hollow.
+        let hollow = verdict.volumes.iter().filter(|v| **v < 0.0).count();
+        assert_eq!(
+            hollow > 0,
+            report.to_string().contains("walls of cavities"),
+            "{what}"
+        );
+        assert_eq!(
+            what == "a ball's surface",
+            parts == Some(2) && hollow == 1,
+            "{what}"
+        );
+        let farthest = report.parts[0].sources[0].thickened_m.unwrap();
+        assert!((farthest / thickness - 0.65).abs() < 1e-12);
+    }
+}
+
+/// What all parts were moved by, m, as the report tells: to half of 1e-5 m along each axis. Nothing where they were not moved.
+fn moved_by(report: &ImportReport) -> Option<Point> {
+    let mut notes = report.notes.iter();
+    let note = notes.find(|note| note.contains("far from the origin"))?;
+    let (_, place) = note.split_once("by the same (")?;
+    let (place, _) = place.split_once(')')?;
+    let mut numbers = place.split(", ").map(|word| word.parse().unwrap());
+    Some([0; 3].map(|_| numbers.next().unwrap()))
+}
+
+#[test]
+fn gaps_between_points_that_go_through_are_counted() {
+    // A ring of points has one, a plane with 2 x 3 openings six.
+    let ring = |k: i32| {
+        let angle = f64::from(k) * std::f64::consts::TAU / 126.0;
+        [0.02 * angle.cos(), 0.02 * angle.sin(), 0.0]
+    };
+    let ring: Vec<Point> = (0..126).map(ring).collect();
+    let cells = (0..22).flat_map(|i| (0..31).map(move |j| [i, j]));
+    let holed = cells.filter(|[i, j]| {
+        !([5, 15].contains(&(i / 2 * 2 - 1)) && [5, 15, 25].contains(&(j / 2 * 2 - 1)))
+    });
+    let holed: Vec<Point> = holed
+        .map(|[i, j]| [f64::from(i) * 1e-3, f64::from(j) * 1e-3, 0.0])
+        .collect();
+    assert_eq!(holed.len(), 22 * 31 - 6 * 4);
+    for (cloud, gaps) in [(&ring, 1), (&holed, 6)] {
+        let (report, _) = import_as("a.ply", &ply_points(cloud), Some(1.6e-3), Some("m")).unwrap();
+        let told = report.to_string();
+        assert!(
+            told.contains(&format!("; {gaps} gaps between points go through it")),
+            "{told}"
+        );
+    }
+    // Thicker, they are closed.
+    let (report, _) = import_as("a.ply", &ply_points(&holed), Some(4e-3), Some("m")).unwrap();
+    assert!(
+        !report.to_string().contains("gaps between points"),
+        "{report}"
+    );
+}
+
+#[test]
+fn points_of_every_format_and_unit_give_the_same_shell() {
+    let cloud = random(60, |p| p.map(|c| (100.0 * c).round() / 8.0));
+    let mut lines = String::new();
+    for [x, y, z] in &cloud {
+        writeln!(lines, "{x} {y} {z} 0 0 1").unwrap();
+    }
+    let commas = format!("x;y;z;nx;ny;nz\n{}", lines.replace(' ', ";"));
+    let pcd = format!(
+        "VERSION 0.7\nFIELDS x y z nx ny nz\nSIZE 4 4 4 4 4 4\nTYPE F F F F F F\nCOUNT 1 1 1 1 1 1\nWIDTH 61\nHEIGHT 1\nPOINTS 61\nDATA ascii\n{lines}nan nan nan nan nan nan\n"
+    );
+    let obj: String = cloud
+        .iter()
+        .map(|[x, y, z]| format!("v {x} {y} {z}\n"))
+        .collect();
+    let ply = ply_points(&cloud);
+    let (_, meant) = import_as("a.ply", &ply, Some(6e-3), Some("mm")).unwrap();
+    for (name, bytes) in [
+        ("a.xyz", lines.as_bytes()),
+        ("a.TXT", lines.as_bytes()),
+        ("a.csv", commas.as_bytes()),
+        ("a.pcd", pcd.as_bytes()),
+        ("a.obj", obj.as_bytes()),
+    ] {
+        let (report, verdict) = import_as(name, bytes, Some(6e-3), Some("mm")).unwrap();
+        assert!(verdict.soup == meant.soup, "{name}");
+        assert_eq!(
+            report.to_string().contains("left out 1 points"),
+            name == "a.pcd"
+        );
+    }
+    let metres: Vec<Point> = cloud.iter().map(|p| p.map(|c| c * 1e-3)).collect();
+    judge_shell(&metres, 6e-3, &meant, ([0.0; 3], 1e-11), "millimetres");
+}
+
+#[test]
+fn what_is_no_cloud_or_cannot_be_a_shell_is_refused_with_what_to_do() {
+    let two = ply_points(&[[0.0; 3], [1.0, 0.0, 0.0]]);
+    for (name, bytes, thicken, said) in [
+        (
+            "a.ply",
+            two.clone(),
+            None,
+            "has no faces, only 2 points: `taut import --thicken` makes a shell",
+        ),
+        (
+            "a.xyz",
+            b"0 0 0\n1 1 1\n".to_vec(),
+            None,
+            "only 2 points: `taut import --thicken`",
+        ),
+        ("a.xyz", b"# nothing\n".to_vec(), Some(1e-3), "has no faces"),
+        (
+            "a.xyz",
+            b"0 0 0\n0 inf 0\n".to_vec(),
+            Some(1e-3),
+            "a.xyz:2: vertex 1 has y = inf",
+        ),
+        (
+            "a.xyz",
+            b"0 0 0\n1e300 0 0\n".to_vec(),
+            Some(1e-3),
+            "nothing for a hand",
+        ),
+        (
+            "a.ply",
+            ply_points(&[[0.0; 3], [f64::NAN, 0.0, 0.0]]),
+            Some(1e-3),
+            "vertex 1 has x = NaN",
+        ),
+        (
+            "a.las",
+            b"LASF".to_vec(),
+            Some(1e-3),
+            "is no known mesh format",
+        ),
+    ] {
+        let error = import_as(name, &bytes, thicken, None)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(said), "{name}: {error}");
+    }
+    // 30 km away in single precision digits are 2 mm apart.
+    let far = random(50, |p| p.map(|c| f64::from((0.02 * c + 3e4) as f32)));
+    let error = import_as("a.ply", &ply_points(&far), Some(2e-3), Some("m"))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("move them near to the origin in double precision"),
+        "{error}"
+    );
+}
+
+/// A file of a sheet, one of a scan, one of a solid: one body.
+#[test]
+fn a_scan_is_joined_with_meshes_in_one_body() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = random(1500, |p| on_ball(p, 0.01).map(|c| c + 0.1));
+    let files: [(&str, Vec<u8>); 3] = [
+        (
+            "a.xyz",
+            scan.iter()
+                .map(|[x, y, z]| format!("{x} {y} {z}\n"))
+                .collect::<String>()
+                .into(),
+        ),
+        ("b.obj", obj_soup(&part())),
+        (
+            "c.ply",
+            super::write::ply(&super::solids::moved(
+                sheet([0.06, 0.04], [3, 2]),
+                [0.1, 0.0, 0.0],
+            )),
+        ),
+    ];
+    let parts = files.map(|(name, bytes)| {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+        taut_scene::ImportPart {
+            body: Some("all".into()),
+            ..folder.path().join(name).into()
+        }
+    });
+    let report = import(&ImportRequest {
+        parts: parts.into(),
+        folder: folder.path().join("out"),
+        thicken: Some(5e-3),
+        ..ImportRequest::default()
+    });
+    let report = report.unwrap();
+    let verdict = judge(&Path::new(&report.folder).join(&report.parts[0].mesh_file));
+    assert!(verdict.closed);
+    assert_eq!(verdict.volumes.len(), 4, "{report}");
+}
+
+#[test]
+fn a_million_points_are_taken() {
+    let cloud = random(1_000_000, |p| on_ball(p, 0.05));
+    let (report, verdict) = import_as("a.ply", &ply_points(&cloud), Some(0.02), Some("m")).unwrap();
+    assert!(verdict.closed && verdict.volumes.len() == 2, "{report}");
+    // Balls of the radii 0.06 and 0.04, and what the lattice adds.
+    let volume: f64 = verdict.volumes.iter().sum();
+    let meant = 4.0 / 3.0 * std::f64::consts::PI * (0.06_f64.powi(3) - 0.04_f64.powi(3));
+    assert!((volume / meant - 1.0).abs() < 0.02, "{}", volume / meant);
+}
