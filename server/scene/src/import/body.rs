@@ -97,7 +97,7 @@ pub(super) fn body(
     }
     let look = look_of(&members, mesh_file);
     drop(members);
-    let mesh = checked(all).map_err(|faults| {
+    let (mesh, figures) = checked(all).map_err(|faults| {
         FileError::of_all(
             faults
                 .into_iter()
@@ -115,6 +115,12 @@ pub(super) fn body(
     let is_thickened = reports.iter().any(|source| source.thickened_m.is_some());
     let meeting = felt_meeting(&mesh, &files_text, is_thickened).map_err(fail)?;
     let raw = upright(RawMesh::from(&mesh), common_up);
+    let is_as_checked = simplified.is_none() && common_up != Some(UpAxis::Y);
+    let figures = if is_as_checked {
+        figures
+    } else {
+        MeshFigures::of(&raw)
+    };
     let mut report = PartReport {
         sources: reports,
         body: name.to_owned(),
@@ -122,7 +128,7 @@ pub(super) fn body(
         findings,
         simplified_m: None,
         appearance: look.appearance,
-        mesh: MeshFigures::of(&raw),
+        mesh: figures,
     };
     if let Some(outcome) = &simplified {
         report.simplified(outcome);
@@ -157,8 +163,9 @@ fn turn(mesh: &mut RawMesh, findings: &mut Vec<Finding>) -> Vec<u32> {
 }
 
 /// The surface as the method takes it.
-fn checked(mesh: RawMesh) -> Result<Mesh, Vec<String>> {
-    let faults = MeshFigures::of(&mesh).faults();
+fn checked(mesh: RawMesh) -> Result<(Mesh, MeshFigures), Vec<String>> {
+    let figures = MeshFigures::of(&mesh);
+    let faults = figures.faults();
     if !faults.is_empty() {
         let all = faults.into_iter().map(|fault| {
             format!(
@@ -168,7 +175,8 @@ fn checked(mesh: RawMesh) -> Result<Mesh, Vec<String>> {
         });
         return Err(all.collect());
     }
-    Mesh::new(mesh.vertices, mesh.triangles).map_err(|error| vec![error.to_string()])
+    let mesh = Mesh::new(mesh.vertices, mesh.triangles).map_err(|error| vec![error.to_string()])?;
+    Ok((mesh, figures))
 }
 
 /// Where the surface meets itself, if what overlaps is outward; else why it is refused.

@@ -5,12 +5,20 @@
 
 use nalgebra::{Point3, Vector3};
 
+use god_object::geometry::connected;
+
 use super::edges::{Side, by_edge, sides};
+use super::report::Places;
 use crate::mesh_file::RawMesh;
 
+/// Cosine between two sheets that go on around a right angle: 0, and rounding.
+const RIGHT_ANGLE: f64 = 1e-6;
+
 /// What was taken apart.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct TakenApart {
+    /// Middles of edges at which sheets were split.
+    pub(super) split: Places,
     /// Vertices that were added, where others are.
     pub(super) vertices: usize,
     pub(super) place: Option<Point3<f64>>,
@@ -24,12 +32,28 @@ pub(super) struct Crowded {
     pub(super) place: Point3<f64>,
 }
 
-/// Gives each surface its own vertices. Vertices without a triangle are gone after that.
-pub(super) fn take_apart(mesh: &mut RawMesh) -> Result<TakenApart, Crowded> {
+/// Gives each surface its own vertices. Vertices without a triangle are gone after that. With `split`, sheets that meet at an edge are taken apart, too.
+pub(super) fn take_apart(mesh: &mut RawMesh, split: bool) -> Result<TakenApart, Crowded> {
     let corner_count = 3 * mesh.triangles.len();
     let mut sets = Sets::new(corner_count);
-    for group in by_edge(&sides(&mesh.triangles)) {
-        let pairs = pairs(mesh, group).ok_or_else(|| Crowded {
+    let all = sides(&mesh.triangles);
+    let is_crowded = |group: &[Side]| group.len() > 2;
+    let is_sheet = if split && by_edge(&all).any(is_crowded) {
+        sheets(&mesh.triangles)
+    } else {
+        Vec::new()
+    };
+    let mut done = TakenApart::default();
+    for group in by_edge(&all) {
+        let has_sheet = |side: &Side| is_sheet.get(side.triangle as usize) == Some(&true);
+        let pairs = if is_crowded(group) && group.iter().any(has_sheet) {
+            let ends = group[0].ends.map(|v| mesh.vertices[v as usize]);
+            done.split.add(nalgebra::center(&ends[0], &ends[1]));
+            sheet_pairs(mesh, group, &is_sheet)
+        } else {
+            pairs(mesh, group)
+        };
+        let pairs = pairs.ok_or_else(|| Crowded {
             triangles: group.len(),
             place: nalgebra::center(
                 &mesh.vertices[group[0].ends[0] as usize],
@@ -42,7 +66,7 @@ pub(super) fn take_apart(mesh: &mut RawMesh) -> Result<TakenApart, Crowded> {
             }
         }
     }
-    let (mut vertices, mut done) = (Vec::new(), TakenApart::default());
+    let mut vertices = Vec::new();
     let mut place_of_root = vec![u32::MAX; corner_count];
     let mut used = vec![false; mesh.vertices.len()];
     let mut triangles = mesh.triangles.clone();
@@ -111,15 +135,67 @@ fn pairs(mesh: &RawMesh, group: &[Side]) -> Option<Vec<[Side; 2]>> {
     (0..count).step_by(2).map(pair).collect()
 }
 
-/// Sets of corners that are one vertex.
-struct Sets(Vec<u32>);
+/// Which sides of an edge of sheets belong together; `None` of one with other surfaces that cannot be told apart.
+///
+/// Sheets and fins end at a closed surface. Those that meet only each other go on where they are the straightest, at most around a right angle.
+fn sheet_pairs(mesh: &RawMesh, group: &[Side], is_sheet: &[bool]) -> Option<Vec<[Side; 2]>> {
+    let of_sheet = |side: &Side| is_sheet[side.triangle as usize];
+    let (sheets, closed): (Vec<Side>, Vec<Side>) = group.iter().partition(|side| of_sheet(side));
+    if !closed.is_empty() {
+        return pairs(mesh, &closed);
+    }
+    let arm = |side: &Side| {
+        let [low, high] = side.ends.map(|v| mesh.vertices[v as usize]);
+        let apex = mesh.triangles[side.triangle as usize][(usize::from(side.corner) + 2) % 3];
+        let (along, arm) = (high - low, mesh.vertices[apex as usize] - low);
+        let arm: Vector3<f64> = arm - along * (arm.dot(&along) / along.norm_squared());
+        arm.try_normalize(0.0).unwrap_or_default()
+    };
+    let arms: Vec<Vector3<f64>> = sheets.iter().map(arm).collect();
+    let mut bends: Vec<(f64, usize, usize)> = Vec::new();
+    for a in 0..sheets.len() {
+        bends.extend((a + 1..sheets.len()).map(|b| (arms[a].dot(&arms[b]), a, b)));
+    }
+    // Right angles are not lost to rounding.
+    bends.retain(|(cosine, ..)| *cosine <= RIGHT_ANGLE);
+    bends.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut is_free = vec![true; sheets.len()];
+    let mut found = Vec::new();
+    for (_, a, b) in bends {
+        if is_free[a] && is_free[b] {
+            (is_free[a], is_free[b]) = (false, false);
+            found.push([sheets[a], sheets[b]]);
+        }
+    }
+    Some(found)
+}
+
+/// Triangles of patches that have a border: connected through edges of two triangles, up to edges of one.
+fn sheets(triangles: &[[u32; 3]]) -> Vec<bool> {
+    let all = sides(triangles);
+    let pairs = by_edge(&all).filter(|group| group.len() == 2);
+    let pairs = pairs.map(|pair| [pair[0].triangle, pair[1].triangle]);
+    let patches = connected(triangles.len(), pairs);
+    let mut is_sheet = vec![false; triangles.len()];
+    for side in by_edge(&all).filter(|group| group.len() == 1) {
+        is_sheet[side[0].triangle as usize] = true;
+    }
+    for patch in patches {
+        let is_open = patch.iter().any(|t| is_sheet[*t as usize]);
+        patch.iter().for_each(|t| is_sheet[*t as usize] = is_open);
+    }
+    is_sheet
+}
+
+/// Sets of numbers.
+pub(super) struct Sets(Vec<u32>);
 
 impl Sets {
-    fn new(count: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         Self((0..count as u32).collect())
     }
 
-    fn root(&mut self, mut i: usize) -> usize {
+    pub(super) fn root(&mut self, mut i: usize) -> usize {
         while self.0[i] as usize != i {
             self.0[i] = self.0[self.0[i] as usize];
             i = self.0[i] as usize;
@@ -127,7 +203,7 @@ impl Sets {
         i
     }
 
-    fn join(&mut self, a: usize, b: usize) {
+    pub(super) fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b)] = a.min(b) as u32;
     }

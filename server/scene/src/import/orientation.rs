@@ -15,8 +15,17 @@ pub(super) struct OneSided {
     pub(super) place: Point3<f64>,
 }
 
-/// Lets the triangles of each connected surface agree about outside, turning the fewer of them.
-pub(super) fn agree(mesh: &mut RawMesh) -> Result<Places, OneSided> {
+/// What was done so that triangles agree.
+#[derive(Debug, Default)]
+pub(super) struct Agreement {
+    /// Middles of the triangles that were turned.
+    pub(super) turned: Places,
+    /// Places on open sheets of one side, which were left as they are.
+    pub(super) one_sided: Places,
+}
+
+/// Lets the triangles of each connected surface agree about outside, turning the fewer of them. `sheets` may have one side only, if they are open.
+pub(super) fn agree(mesh: &mut RawMesh, sheets: bool) -> Result<Agreement, OneSided> {
     let all = sides(&mesh.triangles);
     let mut beside: Vec<[Option<(u32, bool)>; 3]> = vec![[None; 3]; mesh.triangles.len()];
     for group in by_edge(&all) {
@@ -29,6 +38,7 @@ pub(super) fn agree(mesh: &mut RawMesh) -> Result<Places, OneSided> {
             link(b, a);
         }
     }
+    let mut done = Agreement::default();
     let mut turned: Vec<Option<bool>> = vec![None; mesh.triangles.len()];
     for start in 0..mesh.triangles.len() {
         if turned[start].is_some() {
@@ -36,6 +46,7 @@ pub(super) fn agree(mesh: &mut RawMesh) -> Result<Places, OneSided> {
         }
         turned[start] = Some(false);
         let (mut surface, mut next) = (vec![start], 0);
+        let mut disagreement = None;
         while let Some(&t) = surface.get(next) {
             next += 1;
             for (corner, (other, same_way)) in beside[t]
@@ -51,10 +62,17 @@ pub(super) fn agree(mesh: &mut RawMesh) -> Result<Places, OneSided> {
                 } else if turned[other] != wanted {
                     let t = mesh.triangles[t];
                     let ends = [t[corner], t[(corner + 1) % 3]].map(|v| mesh.vertices[v as usize]);
-                    let place = nalgebra::center(&ends[0], &ends[1]);
-                    return Err(OneSided { place });
+                    disagreement.get_or_insert(nalgebra::center(&ends[0], &ends[1]));
                 }
             }
+        }
+        if let Some(place) = disagreement {
+            let is_open = surface.iter().any(|t| beside[*t].contains(&None));
+            if !(sheets && is_open) {
+                return Err(OneSided { place });
+            }
+            done.one_sided.add(place);
+            surface.iter().for_each(|t| turned[*t] = Some(false));
         }
         let against = surface.iter().filter(|t| turned[**t] == Some(true)).count();
         if 2 * against > surface.len() {
@@ -63,14 +81,13 @@ pub(super) fn agree(mesh: &mut RawMesh) -> Result<Places, OneSided> {
             }
         }
     }
-    let mut places = Places::default();
     for (t, turned) in turned.iter().enumerate() {
         if *turned == Some(true) {
-            places.add(middle(mesh, mesh.triangles[t]));
+            done.turned.add(middle(mesh, mesh.triangles[t]));
             mesh.triangles[t].swap(1, 2);
         }
     }
-    Ok(places)
+    Ok(done)
 }
 
 /// What the nesting of closed parts came to.

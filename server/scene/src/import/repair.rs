@@ -60,7 +60,9 @@ pub(super) fn repair(
             )
         },
     );
-    make_surfaces(&mut mesh, &mut findings)?;
+    // Holes of a sheet that is split, or has one side, cannot be told from its border.
+    let sheets = wishes.thicken.is_some() && wishes.close_holes.unwrap_or(0) == 0;
+    make_surfaces(&mut mesh, sheets, &mut findings)?;
     let thickened = close(&mut mesh, wishes, &mut findings)?;
     Ok(Repaired {
         mesh,
@@ -127,15 +129,24 @@ fn join(
     Ok(welded)
 }
 
-/// Surfaces whose edges have two triangles or one, which agree about outside.
-fn make_surfaces(mesh: &mut RawMesh, findings: &mut Vec<Finding>) -> Result<(), Vec<String>> {
-    let apart = manifold::take_apart(mesh).map_err(|crowded| {
+/// Surfaces whose edges have two triangles or one, which agree about outside. `sheets` are split where they meet, and may have one side.
+fn make_surfaces(
+    mesh: &mut RawMesh,
+    sheets: bool,
+    findings: &mut Vec<Finding>,
+) -> Result<(), Vec<String>> {
+    let apart = manifold::take_apart(mesh, sheets).map_err(|crowded| {
         vec![format!(
-            "has {} triangles at the edge about {}, and it cannot be told which belong together; remove inner walls and loose fins there, or export bodies one by one",
+            "has {} triangles at the edge about {}, and it cannot be told which belong together; remove inner walls and loose fins there, or export bodies one by one; sheets that meet at an edge, and fins, become solids with --thicken",
             crowded.triangles,
             place_text(&crowded.place)
         )]
     })?;
+    note(findings, "sheets-split", &apart.split, |n| {
+        format!(
+            "split sheets at {n} edges where more than two triangles meet; the solids that they become overlap there"
+        )
+    });
     note(
         findings,
         "taken-apart",
@@ -152,14 +163,19 @@ fn make_surfaces(mesh: &mut RawMesh, findings: &mut Vec<Finding>) -> Result<(), 
             "falls into {loose} loose parts, but {MAX_LOOSE_PARTS} are the limit; is its unit right, and is it a surface?"
         )]);
     }
-    let turned = orientation::agree(mesh).map_err(|one_sided| {
+    let agreed = orientation::agree(mesh, sheets).map_err(|one_sided| {
         vec![format!(
-            "has a surface with one side only, as a Moebius strip: its triangles cannot agree about outside, as at {}; mend it in the program that made it",
+            "has a surface with one side only, as a Moebius strip: its triangles cannot agree about outside, as at {}; if it is an open sheet, write --thicken with its thickness in metres; else mend it in the program that made it",
             place_text(&one_sided.place)
         )]
     })?;
-    note(findings, "triangles-turned", &turned, |n| {
+    note(findings, "triangles-turned", &agreed.turned, |n| {
         format!("turned {n} triangles that disagreed with their neighbours about outside")
+    });
+    note(findings, "one-sided", &agreed.one_sided, |n| {
+        format!(
+            "found {n} sheets with one side only, as a Moebius strip; their solids are felt on both"
+        )
     });
     Ok(())
 }

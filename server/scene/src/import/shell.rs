@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::edges::{borders, components};
+use super::edges::{Side, borders, by_edge, components, sides};
 use super::faces::corners;
+use super::manifold::Sets;
 use super::report::Places;
 use crate::mesh_file::RawMesh;
 
@@ -22,6 +23,9 @@ pub(super) struct Thickened {
 }
 
 /// Makes each open sheet a solid of this thickness, m. Parts that are closed stay.
+///
+/// Which side of a triangle is outside does not count, and a sheet may have one side only: each triangle has two copies, and those of two neighbours are
+/// joined that lie on the same side where they meet.
 pub(super) fn thicken(mesh: &mut RawMesh, thickness: f64) -> Thickened {
     let mut done = Thickened::default();
     let open = borders(&mesh.triangles);
@@ -34,44 +38,49 @@ pub(super) fn thicken(mesh: &mut RawMesh, thickness: f64) -> Thickened {
             part.iter().for_each(|t| is_open[*t as usize] = true);
         }
     }
-    let sheet: Vec<[u32; 3]> = mesh
-        .triangles
-        .iter()
-        .zip(&is_open)
-        .filter(|(_, open)| **open)
-        .map(|(t, _)| *t)
-        .collect();
-    let ways = ways(mesh, &sheet, thickness / 2.0);
-    done.thinnest = sheet
-        .iter()
+    let copies = Copies::of(mesh, &is_open);
+    let ways = ways(mesh, &is_open, &copies, thickness / 2.0);
+    let normals = (0..mesh.triangles.len()).filter(|t| is_open[*t]);
+    done.thinnest = normals
         .flat_map(|t| {
-            let n = normal(mesh, t);
-            let ways = &ways;
-            t.iter().map(move |v| 2.0 * ways[*v as usize].dot(&n))
+            let (n, ways, copies) = (normal(mesh, &mesh.triangles[t]), &ways, &copies);
+            (0..3).map(move |k| 2.0 * ways[copies.root(t, k, 0)].dot(&n))
         })
         .fold(thickness, f64::min);
-    // The outer copy of a vertex takes its place, the inner copy a new one.
-    let mut inner = vec![u32::MAX; mesh.vertices.len()];
-    for v in sheet.iter().flatten() {
-        let v = *v as usize;
-        if inner[v] == u32::MAX {
-            inner[v] = mesh.vertices.len() as u32;
-            let point = mesh.vertices[v];
-            mesh.vertices[v] = point + ways[v];
-            mesh.vertices.push(point - ways[v]);
-            done.farthest = done.farthest.max(ways[v].norm());
+    let mut place_of = vec![u32::MAX; ways.len()];
+    let mut solid = RawMesh::default();
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        if !is_open[t] {
+            solid.triangles.push(*triangle);
+            continue;
         }
+        let mut at = |k: usize, side: usize| {
+            let root = copies.root(t, k, side);
+            if place_of[root] == u32::MAX {
+                place_of[root] = (mesh.vertices.len() + solid.vertices.len()) as u32;
+                solid
+                    .vertices
+                    .push(mesh.vertices[triangle[k] as usize] + ways[root]);
+                done.farthest = done.farthest.max(ways[root].norm());
+            }
+            place_of[root]
+        };
+        let upper = [0, 1, 2].map(|k| at(k, 0));
+        let lower = [0, 2, 1].map(|k| at(k, 1));
+        solid.triangles.extend([upper, lower]);
     }
-    let at = |v: u32| inner[v as usize];
-    let mut new: Vec<[u32; 3]> = sheet
-        .iter()
-        .map(|t| [at(t[0]), at(t[2]), at(t[1])])
-        .collect();
     for side in &open {
-        let [a, b] = side.directed();
-        new.extend([[b, a, at(a)], [b, at(a), at(b)]]);
+        let (t, k) = (side.triangle as usize, usize::from(side.corner));
+        let at = |k: usize, side: usize| place_of[copies.root(t, k % 3, side)];
+        let [a, b] = [at(k, 0), at(k + 1, 0)];
+        solid
+            .triangles
+            .extend([[b, a, at(k, 1)], [b, at(k, 1), at(k + 1, 1)]]);
     }
-    mesh.triangles.extend(new);
+    mesh.vertices.append(&mut solid.vertices);
+    mesh.triangles = solid.triangles;
+    // The sheet itself is no part of the solid.
+    *mesh = std::mem::take(mesh).without_unused();
     done
 }
 
@@ -80,40 +89,74 @@ fn normal(mesh: &RawMesh, t: &[u32; 3]) -> Vector3<f64> {
     god_object::geometry::face_normal(&[a, b, c]).unwrap_or_default()
 }
 
-/// Where each vertex of the sheet goes, m.
-fn ways(mesh: &RawMesh, sheet: &[[u32; 3]], half: f64) -> Vec<Vector3<f64>> {
+/// The two copies of every corner of every triangle: 0 where the triangle is seen as it is, 1 on its back. Those that are one vertex have the same root.
+struct Copies(Vec<usize>);
+
+impl Copies {
+    fn of(mesh: &RawMesh, is_open: &[bool]) -> Self {
+        let mut sets = Sets::new(6 * mesh.triangles.len());
+        let corner_at = |side: &Side, v: u32| {
+            let triangle = mesh.triangles[side.triangle as usize];
+            let k = triangle.iter().position(|corner| *corner == v);
+            Self::number(side.triangle as usize, k.unwrap_or_default(), 0)
+        };
+        for pair in by_edge(&sides(&mesh.triangles)) {
+            let [a, b] = pair else { continue };
+            if !is_open[a.triangle as usize] {
+                continue;
+            }
+            // Triangles that run along an edge the same way see each other's backs.
+            let turned = usize::from(a.forward == b.forward);
+            for end in a.ends {
+                let (a, b) = (corner_at(a, end), corner_at(b, end));
+                sets.join(a, b + turned);
+                sets.join(a + 1, b + 1 - turned);
+            }
+        }
+        let count = 6 * mesh.triangles.len();
+        Self((0..count).map(|copy| sets.root(copy)).collect())
+    }
+
+    fn number(triangle: usize, corner: usize, side: usize) -> usize {
+        2 * (3 * triangle + corner) + side
+    }
+
+    fn root(&self, triangle: usize, corner: usize, side: usize) -> usize {
+        self.0[Self::number(triangle, corner, side)]
+    }
+}
+
+/// Where each vertex of the solid is from its vertex of the sheet, m, by its root.
+fn ways(mesh: &RawMesh, is_open: &[bool], copies: &Copies, half: f64) -> Vec<Vector3<f64>> {
+    let sheet = || (0..mesh.triangles.len()).filter(|t| is_open[*t]);
     // Weighted by the angle at the vertex: how the sheet is cut into triangles does not count.
-    let mut sums = vec![Vector3::zeros(); mesh.vertices.len()];
-    for t in sheet {
-        let (n, points) = (normal(mesh, t), corners(mesh, *t));
+    let mut ways = vec![Vector3::zeros(); 6 * mesh.triangles.len()];
+    for t in sheet() {
+        let triangle = mesh.triangles[t];
+        let (n, points) = (normal(mesh, &triangle), corners(mesh, triangle));
         for k in 0..3 {
             let (to, from) = (
                 points[(k + 1) % 3] - points[k],
                 points[(k + 2) % 3] - points[k],
             );
-            sums[t[k] as usize] += n * to.angle(&from);
+            let weighted = n * to.angle(&from);
+            ways[copies.root(t, k, 0)] += weighted;
+            ways[copies.root(t, k, 1)] -= weighted;
         }
     }
-    let unit: Vec<Vector3<f64>> = sums
-        .iter()
-        .map(|sum| {
-            let length = sum.norm();
-            if length > 0.0 {
-                sum / length
-            } else {
-                Vector3::zeros()
-            }
-        })
-        .collect();
-    let mut least_cosine = vec![1.0_f64; mesh.vertices.len()];
-    for t in sheet {
-        let n = normal(mesh, t);
-        for v in t {
-            let cosine = unit[*v as usize].dot(&n);
-            least_cosine[*v as usize] = least_cosine[*v as usize].min(cosine);
+    for way in &mut ways {
+        *way = way.try_normalize(0.0).unwrap_or_default();
+    }
+    let mut least_cosine = vec![1.0_f64; ways.len()];
+    for t in sheet() {
+        let n = normal(mesh, &mesh.triangles[t]);
+        for (k, side) in (0..3).flat_map(|k| [(k, 0), (k, 1)]) {
+            let root = copies.root(t, k, side);
+            let outward = if side == 0 { n } else { -n };
+            least_cosine[root] = least_cosine[root].min(ways[root].dot(&outward));
         }
     }
-    unit.iter()
+    ways.iter()
         .zip(&least_cosine)
         .map(|(way, cosine)| way * (half / cosine.max(1.0 / MOST_MITER)))
         .collect()

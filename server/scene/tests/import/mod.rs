@@ -9,5 +9,6 @@ mod judge;
 mod page;
 mod pieces;
 mod rubble;
+mod sheets;
 mod solids;
 mod write;

@@ -40,6 +40,10 @@ pub(super) fn openings() -> Vec<Case> {
             }
         })
     };
+    let tee = || {
+        let stem = mapped(sheet([0.03, 0.04], [3, 4]), |[x, y, _]| [0.03, y, x]);
+        joined([flat(), stem])
+    };
     let tin = || soup_of(&taut_scene::shapes::cylinder(0.02, 0.01, 24, Axis::Z));
     let opened = || without(tin(), |p| p[2] == 0.01);
     vec![
@@ -131,6 +135,15 @@ pub(super) fn openings() -> Vec<Case> {
             bent(),
             &["thickened"],
             (1, 2.4e-6),
+        )
+        .options("--thicken 0.001"),
+        good(
+            "tee.stl",
+            "two sheets that make a T, to be 1 mm thick",
+            stl(&tee()),
+            tee(),
+            &["sheets-split", "taken-apart", "thickened", "meets-itself"],
+            (2, 3.6e-6),
         )
         .options("--thicken 0.001"),
         good(
