@@ -335,7 +335,7 @@ mod tests {
         fs::write(folder.path().join("part.obj"), part).expect("written");
         let made = folder.path().join("made");
         let report = taut_scene::import(&taut_scene::ImportRequest {
-            parts: vec![folder.path().join("part.obj")],
+            parts: vec![folder.path().join("part.obj").into()],
             folder: made.clone(),
             unit: "m".parse().ok(),
             simplify: Some(1e-4),

@@ -287,7 +287,7 @@ mod tests {
         for (material, triangles) in runs {
             materials.push(*material, *triangles);
         }
-        materials.look(&cuboid([1.0, 1.0, 1.0]))
+        materials.look(&cuboid([1.0, 1.0, 1.0]), None)
     }
 
     #[test]

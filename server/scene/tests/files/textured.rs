@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use image::{ImageFormat, Rgba, RgbaImage};
 use taut_proto::Wrap;
-use taut_scene::{BodyTextures, BuiltBody, BuiltScene, ImportRequest, Scene, import};
+use taut_scene::{BodyTextures, BuiltBody, BuiltScene, ImportPart, ImportRequest, Scene, import};
 
 /// Red, green, blue and yellow, from the upper left on, row by row.
 const COLOURS: [[u8; 4]; 4] = [
@@ -124,7 +124,7 @@ impl Folder {
     fn imported(&self, part: PathBuf) -> (BuiltBody, Vec<String>, String) {
         let folder = self.path("made");
         let report = import(&ImportRequest {
-            parts: vec![part],
+            parts: vec![part.into()],
             folder: folder.clone(),
             unit: Some("m".parse().unwrap()),
             ..ImportRequest::default()
@@ -213,6 +213,49 @@ fn a_gltf_picture_is_read_from_wherever_it_is() {
         let kept = std::fs::read(folder.path("made/a-visual-1.png")).unwrap();
         assert_eq!(kept, picture, "the file itself");
     }
+}
+
+#[test]
+fn a_body_of_several_files_has_the_pictures_of_each() {
+    let folder = Folder::new();
+    folder.gltf("a.gltf", At::Uri, &png(&board(8, 255)), "", "");
+    let plain = "v 1 0 0\nv 1 0.02 0\nv 1.02 0 0\nv 1 0 0.02\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n";
+    folder.write("b.obj", plain);
+    let grey = RgbaImage::from_pixel(4, 4, Rgba([90, 90, 90, 255]));
+    folder.write("c.png", png(&grey));
+    folder.write(
+        "a.mtl",
+        "newmtl wood\nmap_Kd c.png\nnewmtl steel\nKd 1 0 0\n",
+    );
+    folder.write(
+        "c.obj",
+        OBJ.replace("v 0 0", "v 2 0").replace("v 0.02", "v 2.02"),
+    );
+    let of_one = |name: &str| ImportPart {
+        body: Some("one".to_owned()),
+        ..folder.path(name).into()
+    };
+    let made = folder.path("made");
+    let report = import(&ImportRequest {
+        parts: ["a.gltf", "b.obj", "c.obj"].map(of_one).into(),
+        folder: made.clone(),
+        unit: Some("m".parse().unwrap()),
+        ..ImportRequest::default()
+    });
+    assert!(!report.unwrap().to_string().contains("not drawn"));
+    let built = Scene::load(&made.join("scene.toml")).and_then(|scene| scene.build());
+    let built = built.unwrap();
+    assert_eq!(built.lost_looks, [""; 0]);
+    let body = &built.bodies[0];
+    assert_eq!(body.mesh.triangles.len(), 12);
+    assert_laid(body);
+    let all = textures(body);
+    let counts: Vec<usize> = body.looks.iter().map(|(_, count)| *count).collect();
+    assert_eq!(counts, [4, 4, 1, 3]);
+    let texel = |place: usize| all.list[place].texture.texels()[0];
+    let found: Vec<_> = all.of_looks.iter().map(|place| place.map(texel)).collect();
+    let expected = [Some(COLOURS[0]), None, Some([90, 90, 90, 255]), None];
+    assert_eq!(found, expected);
 }
 
 #[test]
