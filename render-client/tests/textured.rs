@@ -335,9 +335,10 @@ fn waves(side: u32) -> TriangleMesh {
 
 #[test]
 fn fewer_triangles_show_the_picture_where_all_of_them_do() {
-    // So few pixels that half of one is 4 mm at the nearest place.
+    // So few pixels, from so far, that half of one is some millimetres.
     let mut stage = stage(vec![waves(150)]);
     stage.screens[0].pixels = (80, 80);
+    stage.head = Isometry3::translation(0.1, -6.0, 0.2);
     let Some(mut canvas) = canvas(stage) else {
         return;
     };
