@@ -152,9 +152,9 @@ impl Mean {
     fn add(&mut self, [red, green, blue, opacity]: [u8; 4]) {
         let light = [red, green, blue].map(|value| light_table()[usize::from(value)]);
         let opacity = f32::from(opacity);
-        for part in 0..3 {
-            self.seen[part] += opacity * light[part];
-            self.plain[part] += light[part];
+        for (part, light) in light.into_iter().enumerate() {
+            self.seen[part] += opacity * light;
+            self.plain[part] += light;
         }
         self.opacity += opacity;
         self.count += 1.0;
