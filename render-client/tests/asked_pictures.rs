@@ -43,7 +43,7 @@ fn frames_of(server: &Server, node: &str) -> u64 {
     let clients = server.link.clients();
     let status = clients.iter().find(|status| status.node == node);
     let stats = status.and_then(|status| status.stats.as_ref());
-    stats.map_or(0, |stats| stats.frames.into())
+    stats.map_or(0, |stats| stats.frames)
 }
 
 #[test]

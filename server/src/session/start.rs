@@ -134,16 +134,18 @@ impl Session {
             switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
         });
         let operator = match (&setup.operator, facts) {
-            (Some(wanted), Some(facts)) => Some(OperatorPage::start(
-                wanted,
-                facts,
-                outlets.add(),
-                kept,
-                &loops.statistics,
-                clock,
-                &policy,
-                link.picture_asker(runtime.handle().clone()),
-            )?),
+            (Some(wanted), Some(facts)) => {
+                let page = OperatorPage::start(
+                    wanted,
+                    facts,
+                    outlets.add(),
+                    kept,
+                    &loops.statistics,
+                    clock,
+                    &policy,
+                )?;
+                Some(page.with_pictures(link.picture_asker(runtime.handle().clone())))
+            }
             _ => {
                 kept.close();
                 None

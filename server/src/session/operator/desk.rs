@@ -77,16 +77,19 @@ impl OperatorDesk {
         haptics: Arc<HapticsStatistics>,
         clock: SessionClock,
         policy: &JoinPolicy,
-        pictures: PictureAsker,
     ) {
         self.follow_policy(policy);
-        self.pictures.follow(Some(pictures));
         self.watched().seen = Some(Seen {
             haptics,
             clock,
             run: RunState::Waiting,
             told_at: None,
         });
+    }
+
+    /// Asks these nodes for pictures, until the session is over.
+    pub(super) fn show_nodes(&self, nodes: PictureAsker) {
+        self.pictures.follow(Some(nodes));
     }
 
     /// The session is over: nothing is armed until the next.

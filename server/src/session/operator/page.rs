@@ -137,11 +137,10 @@ impl OperatorPage {
         statistics: &Statistics,
         clock: SessionClock,
         policy: &JoinPolicy,
-        pictures: PictureAsker,
     ) -> Result<Self, Failure> {
         let door = kept.door(wanted)?;
         let desk = &door.desk;
-        desk.begin(statistics.haptics.clone(), clock, policy, pictures);
+        desk.begin(statistics.haptics.clone(), clock, policy);
         let facts = json(&Facts {
             instance: door.instance.clone(),
             scene_revision: desk.scenes().revision(),
@@ -164,6 +163,12 @@ impl OperatorPage {
             metrics: "null".to_owned(),
             next: Duration::ZERO,
         })
+    }
+
+    /// Asks the render nodes of this session for pictures from now on.
+    pub(crate) fn with_pictures(self, nodes: PictureAsker) -> Self {
+        self.door.desk.show_nodes(nodes);
+        self
     }
 
     /// Where it is, with the port that it got.
