@@ -55,8 +55,8 @@ pub(super) fn look_of(members: &[Member], body_file: &str) -> BodyLook {
     }
     let textures = textures(members, &runs);
     let visual = match looks.len() {
-        ..=1 if textures.is_none() => None,
-        ..=MAX_LOOKS => Some(drawn(members, &runs, textures, body_file)),
+        0 | 1 if textures.is_none() => None,
+        0..=MAX_LOOKS => Some(drawn(members, &runs, textures, body_file)),
         _ => {
             lost.push(format!(
                 "more than {MAX_LOOKS} looks: all of the body has that of {name}"

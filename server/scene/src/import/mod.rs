@@ -47,7 +47,7 @@ use hand_path::hand_path;
 use names::Names;
 use placing::{move_to_origin, note_up};
 use scene_text::{HAND_SECTION, Placed, around, clear_above, scene_text, sphere_radius};
-use source::{Read, Source};
+use source::{Called, Read, Source};
 use visual::Visual;
 
 /// Name of the scene file in the folder.
@@ -142,7 +142,7 @@ fn sources_of<'r>(
     files: &[&ImportPart],
     request: &'r ImportRequest,
     found: &mut HashSet<&'r String>,
-) -> Vec<(String, Result<Vec<Source>, FileError>)> {
+) -> Vec<Called<Vec<Source>>> {
     let mut read = |part: &ImportPart| {
         let read = Read::of(&part.path, request.thicken.is_some())?;
         found.extend(request.only.iter().filter(|name| read.has(name)));

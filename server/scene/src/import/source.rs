@@ -26,6 +26,9 @@ pub(super) struct Source {
     pub(super) up: Option<UpAxis>,
 }
 
+/// What became of something, with what it is called.
+pub(super) type Called<T> = (String, Result<T, FileError>);
+
 /// A file that was read, and nothing done to it.
 pub(super) struct Read {
     path: std::path::PathBuf,
@@ -78,7 +81,7 @@ impl Read {
         self,
         part: &ImportPart,
         request: &ImportRequest,
-    ) -> Result<Vec<(String, Result<Source, FileError>)>, FileError> {
+    ) -> Result<Vec<Called<Source>>, FileError> {
         let stem = self.path.file_stem().unwrap_or_default();
         let stem = stem.to_string_lossy().into_owned();
         if self.file.pieces.names().is_empty() {

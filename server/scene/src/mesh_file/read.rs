@@ -2,10 +2,11 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use super::material::{FileLook, Materials};
+use super::material::Materials;
+use super::part::MeshFile;
 use super::picture_use::PictureSource;
 use super::pieces::Pieces;
-use super::{RawMesh, gltf, gltf_container, mtl, obj, ply, points, stl};
+use super::{RawMesh, gltf, gltf_container, mtl, obj, pcd, ply, points, stl};
 use crate::files::{MAX_MESH_BYTES, read_bytes};
 use crate::problem::{FileError, Problem};
 
@@ -75,107 +76,6 @@ pub fn read_mesh(path: &Path) -> Result<RawMesh, FileError> {
     read_mesh_bytes(path, &mesh_bytes(path)?)
 }
 
-/// A mesh, or chosen pieces of it, and what else its file says.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct MeshPart {
-    pub(crate) mesh: RawMesh,
-    pub(crate) look: FileLook,
-    /// Of the whole file.
-    pub(crate) pieces: Pieces,
-}
-
-/// The pieces of a mesh that have one of the names in `only`, all with none, and how the file says that they look: a material that cannot be read is no
-/// fault of the mesh. At least one of the names must be there.
-pub(crate) fn read_part(path: &Path, only: &[String]) -> Result<MeshPart, FileError> {
-    let mut file = MeshFile::read(path)?;
-    let (mesh, look) = if only.is_empty() {
-        file.take_whole()
-    } else {
-        let chosen = file.pieces.chosen(only);
-        let part = file.parts([&chosen[..]]).next();
-        part.filter(|_| !chosen.is_empty()).ok_or_else(|| {
-            let text = file.pieces.no_such(&only[0]);
-            Problem::of_file(path.display(), text)
-        })?
-    };
-    let pieces = file.pieces;
-    Ok(MeshPart { mesh, look, pieces })
-}
-
-/// Everything of a mesh file.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct MeshFile {
-    pub(crate) mesh: RawMesh,
-    materials: Materials,
-    pub(crate) pieces: Pieces,
-    /// Where pictures are.
-    directory: Option<PathBuf>,
-}
-
-impl MeshFile {
-    /// Reads a mesh and the libraries of materials beside it.
-    pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
-        let bytes = mesh_bytes(path)?;
-        let mut file = parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path))?;
-        file.read_beside(path, &bytes);
-        Ok(file)
-    }
-
-    /// Reads what materials look like, but for their pictures.
-    fn read_beside(&mut self, path: &Path, bytes: &[u8]) {
-        self.materials.read_libraries(self.directory.as_deref());
-        if extension(path) == "obj" && self.materials.have_pictures() {
-            self.materials.coordinates = obj::coordinates_of_pictures(bytes);
-        }
-    }
-
-    /// The same of a file that may hold nothing but points: those of a mesh format, or one of points.
-    pub(crate) fn read_with_points(path: &Path) -> Result<Self, FileError> {
-        let is_points = || POINT_ENDINGS.contains(&extension(path).as_str());
-        let bytes = if !path.is_dir() && is_points() {
-            read_bytes(path, MAX_MESH_BYTES)?
-        } else {
-            mesh_bytes(path)?
-        };
-        let mut file = parse_file(path, &bytes).map_err(|fault| fault.in_file(path))?;
-        file.read_beside(path, &bytes);
-        Ok(file)
-    }
-
-    /// Why a file without faces is no mesh; `None` of one with some.
-    pub(crate) fn lacks_faces(&self) -> Option<String> {
-        let points = self.mesh.vertices.len();
-        match (self.mesh.triangles.len(), points) {
-            (1.., _) => None,
-            (0, 0) => Some("has no faces; export it as a triangle mesh".to_owned()),
-            (0, _) => Some(format!(
-                "has no faces, only {points} points: `taut import --thicken` makes a shell around them, of a thickness in metres above the gaps between them; or reconstruct a surface (in MeshLab: Filters, Remeshing, Screened Poisson), and export that"
-            )),
-        }
-    }
-
-    /// All triangles, which are gone from here then.
-    pub(crate) fn take_whole(&mut self) -> (RawMesh, FileLook) {
-        let materials = std::mem::take(&mut self.materials);
-        let look = materials.look(&self.mesh, self.directory.as_deref());
-        (std::mem::take(&mut self.mesh), look)
-    }
-
-    /// Sets of its triangles, each by itself, and how they look.
-    pub(crate) fn parts<'s>(
-        &'s self,
-        sets: impl IntoIterator<Item = &'s [u32]>,
-    ) -> impl Iterator<Item = (RawMesh, FileLook)> {
-        let of_triangles = self.materials.of_triangles();
-        sets.into_iter().map(move |triangles| {
-            let mesh = self.mesh.some(triangles);
-            let materials = self.materials.some(triangles, &of_triangles);
-            let look = materials.look(&mesh, self.directory.as_deref());
-            (mesh, look)
-        })
-    }
-}
-
 /// Names of the files that this mesh file is read with, relative to its folder, be they there or not: libraries of materials and their pictures, buffers.
 /// None of a mesh that cannot be read: whoever reads it is told why.
 pub(crate) fn files_beside(path: &Path) -> Vec<PathBuf> {
@@ -214,7 +114,7 @@ pub(super) fn below(name: &str) -> Option<PathBuf> {
     (inside && name.file_name().is_some()).then_some(name)
 }
 
-fn mesh_bytes(path: &Path) -> Result<Vec<u8>, Problem> {
+pub(super) fn mesh_bytes(path: &Path) -> Result<Vec<u8>, Problem> {
     if path.is_dir() {
         let text = "is a directory, but a mesh file is needed; name the files in it";
         return Err(Problem::of_file(path.display(), text));
@@ -223,6 +123,16 @@ fn mesh_bytes(path: &Path) -> Result<Vec<u8>, Problem> {
         return Err(Problem::of_file(path.display(), unknown_format(path)));
     }
     read_bytes(path, MAX_MESH_BYTES)
+}
+
+/// The same of a file that may be one of points.
+pub(super) fn mesh_or_point_bytes(path: &Path) -> Result<Vec<u8>, Problem> {
+    let is_points = POINT_ENDINGS.contains(&extension(path).as_str());
+    if is_points && !path.is_dir() {
+        read_bytes(path, MAX_MESH_BYTES)
+    } else {
+        mesh_bytes(path)
+    }
 }
 
 /// The same from bytes that are there already; `path` gives the format, the name in messages and where a .gltf finds its buffers.
@@ -244,13 +154,13 @@ fn unknown_format(path: &Path) -> &'static str {
     }
 }
 
-fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<MeshFile, Fault> {
+pub(super) fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<MeshFile, Fault> {
     let file = parse_file(path, bytes)?;
     file.lacks_faces()
         .map_or(Ok(file), |text| Err(Fault::new(text)))
 }
 
-fn parse_file(path: &Path, bytes: &[u8]) -> Result<MeshFile, Fault> {
+pub(super) fn parse_file(path: &Path, bytes: &[u8]) -> Result<MeshFile, Fault> {
     let (mut materials, mut pieces) = (Materials::default(), Pieces::default());
     let mesh = match extension(path).as_str() {
         "ply" => {
@@ -264,7 +174,7 @@ fn parse_file(path: &Path, bytes: &[u8]) -> Result<MeshFile, Fault> {
             stl::parse(bytes, &mut pieces)
         }
         "glb" | "gltf" => gltf::parse(bytes, path.parent(), &mut materials, &mut pieces),
-        "pcd" => points::parse_pcd(bytes).map(|(mesh, without_return)| {
+        "pcd" => pcd::parse(bytes).map(|(mesh, without_return)| {
             if without_return > 0 {
                 pieces.left_out.push(format!(
                     "left out {without_return} points without a return: their coordinates are no numbers"
@@ -311,7 +221,7 @@ pub(super) fn is_blank(bytes: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh_file::write_ply;
+    use crate::mesh_file::{read_part, write_ply};
     use crate::shapes::cuboid;
     use proptest::prelude::*;
 

@@ -1,15 +1,14 @@
 //! Points without faces as shells: closed, as far from the points as is promised, around all of them. Distances and sides are found each with each.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use taut_scene::{FileError, ImportReport, ImportRequest, import};
 
 use super::judge::{Verdict, judge, winding};
-use super::solids::{Noise, Point, Triangle, part, sheet};
-use super::write::{obj_soup, ply_points};
+use super::solids::{Noise, Point, Triangle};
+use super::write::ply_points;
 
-fn import_as(
+pub(super) fn import_as(
     name: &str,
     bytes: &[u8],
     thicken: Option<f64>,
@@ -49,7 +48,7 @@ fn within([a, b, c]: &Triangle, u: f64, v: f64) -> Point {
 }
 
 /// What is promised of a shell of this thickness around a cloud; `way` is by how much it was moved to the origin, `rounding` how well that is known.
-fn judge_shell(
+pub(super) fn judge_shell(
     cloud: &[Point],
     thickness: f64,
     verdict: &Verdict,
@@ -101,14 +100,14 @@ fn judge_shell(
 }
 
 /// Numbers in [-1, 1] for each of `count` points.
-fn random(count: usize, mut place: impl FnMut([f64; 3]) -> Point) -> Vec<Point> {
+pub(super) fn random(count: usize, mut place: impl FnMut([f64; 3]) -> Point) -> Vec<Point> {
     let mut noise = Noise::new();
     (0..count)
         .map(|_| place([noise.next(), noise.next(), noise.next()]))
         .collect()
 }
 
-fn on_ball(p: [f64; 3], radius: f64) -> Point {
+pub(super) fn on_ball(p: [f64; 3], radius: f64) -> Point {
     let length = p.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-9);
     p.map(|c| radius * c / length)
 }
@@ -278,149 +277,4 @@ fn gaps_between_points_that_go_through_are_counted() {
         !report.to_string().contains("gaps between points"),
         "{report}"
     );
-}
-
-#[test]
-fn points_of_every_format_and_unit_give_the_same_shell() {
-    let cloud = random(60, |p| p.map(|c| (100.0 * c).round() / 8.0));
-    let mut lines = String::new();
-    for [x, y, z] in &cloud {
-        writeln!(lines, "{x} {y} {z} 0 0 1").unwrap();
-    }
-    let commas = format!("x;y;z;nx;ny;nz\n{}", lines.replace(' ', ";"));
-    let pcd = format!(
-        "VERSION 0.7\nFIELDS x y z nx ny nz\nSIZE 4 4 4 4 4 4\nTYPE F F F F F F\nCOUNT 1 1 1 1 1 1\nWIDTH 61\nHEIGHT 1\nPOINTS 61\nDATA ascii\n{lines}nan nan nan nan nan nan\n"
-    );
-    let obj: String = cloud
-        .iter()
-        .map(|[x, y, z]| format!("v {x} {y} {z}\n"))
-        .collect();
-    let ply = ply_points(&cloud);
-    let (_, meant) = import_as("a.ply", &ply, Some(6e-3), Some("mm")).unwrap();
-    for (name, bytes) in [
-        ("a.xyz", lines.as_bytes()),
-        ("a.TXT", lines.as_bytes()),
-        ("a.csv", commas.as_bytes()),
-        ("a.pcd", pcd.as_bytes()),
-        ("a.obj", obj.as_bytes()),
-    ] {
-        let (report, verdict) = import_as(name, bytes, Some(6e-3), Some("mm")).unwrap();
-        assert!(verdict.soup == meant.soup, "{name}");
-        assert_eq!(
-            report.to_string().contains("left out 1 points"),
-            name == "a.pcd"
-        );
-    }
-    let metres: Vec<Point> = cloud.iter().map(|p| p.map(|c| c * 1e-3)).collect();
-    judge_shell(&metres, 6e-3, &meant, ([0.0; 3], 1e-11), "millimetres");
-}
-
-#[test]
-fn what_is_no_cloud_or_cannot_be_a_shell_is_refused_with_what_to_do() {
-    let two = ply_points(&[[0.0; 3], [1.0, 0.0, 0.0]]);
-    for (name, bytes, thicken, said) in [
-        (
-            "a.ply",
-            two.clone(),
-            None,
-            "has no faces, only 2 points: `taut import --thicken` makes a shell",
-        ),
-        (
-            "a.xyz",
-            b"0 0 0\n1 1 1\n".to_vec(),
-            None,
-            "only 2 points: `taut import --thicken`",
-        ),
-        ("a.xyz", b"# nothing\n".to_vec(), Some(1e-3), "has no faces"),
-        (
-            "a.xyz",
-            b"0 0 0\n0 inf 0\n".to_vec(),
-            Some(1e-3),
-            "a.xyz:2: vertex 1 has y = inf",
-        ),
-        (
-            "a.xyz",
-            b"0 0 0\n1e300 0 0\n".to_vec(),
-            Some(1e-3),
-            "nothing for a hand",
-        ),
-        (
-            "a.ply",
-            ply_points(&[[0.0; 3], [f64::NAN, 0.0, 0.0]]),
-            Some(1e-3),
-            "vertex 1 has x = NaN",
-        ),
-        (
-            "a.las",
-            b"LASF".to_vec(),
-            Some(1e-3),
-            "is no known mesh format",
-        ),
-    ] {
-        let error = import_as(name, &bytes, thicken, None)
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains(said), "{name}: {error}");
-    }
-    // 30 km away in single precision digits are 2 mm apart.
-    let far = random(50, |p| p.map(|c| f64::from((0.02 * c + 3e4) as f32)));
-    let error = import_as("a.ply", &ply_points(&far), Some(2e-3), Some("m"))
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("move them near to the origin in double precision"),
-        "{error}"
-    );
-}
-
-/// A file of a sheet, one of a scan, one of a solid: one body.
-#[test]
-fn a_scan_is_joined_with_meshes_in_one_body() {
-    let folder = tempfile::tempdir().unwrap();
-    let scan = random(1500, |p| on_ball(p, 0.01).map(|c| c + 0.1));
-    let files: [(&str, Vec<u8>); 3] = [
-        (
-            "a.xyz",
-            scan.iter()
-                .map(|[x, y, z]| format!("{x} {y} {z}\n"))
-                .collect::<String>()
-                .into(),
-        ),
-        ("b.obj", obj_soup(&part())),
-        (
-            "c.ply",
-            super::write::ply(&super::solids::moved(
-                sheet([0.06, 0.04], [3, 2]),
-                [0.1, 0.0, 0.0],
-            )),
-        ),
-    ];
-    let parts = files.map(|(name, bytes)| {
-        std::fs::write(folder.path().join(name), bytes).unwrap();
-        taut_scene::ImportPart {
-            body: Some("all".into()),
-            ..folder.path().join(name).into()
-        }
-    });
-    let report = import(&ImportRequest {
-        parts: parts.into(),
-        folder: folder.path().join("out"),
-        thicken: Some(5e-3),
-        ..ImportRequest::default()
-    });
-    let report = report.unwrap();
-    let verdict = judge(&Path::new(&report.folder).join(&report.parts[0].mesh_file));
-    assert!(verdict.closed);
-    assert_eq!(verdict.volumes.len(), 4, "{report}");
-}
-
-#[test]
-fn a_million_points_are_taken() {
-    let cloud = random(1_000_000, |p| on_ball(p, 0.05));
-    let (report, verdict) = import_as("a.ply", &ply_points(&cloud), Some(0.02), Some("m")).unwrap();
-    assert!(verdict.closed && verdict.volumes.len() == 2, "{report}");
-    // Balls of the radii 0.06 and 0.04, and what the lattice adds.
-    let volume: f64 = verdict.volumes.iter().sum();
-    let meant = 4.0 / 3.0 * std::f64::consts::PI * (0.06_f64.powi(3) - 0.04_f64.powi(3));
-    assert!((volume / meant - 1.0).abs() < 0.02, "{}", volume / meant);
 }

@@ -2,6 +2,7 @@
 
 mod awkward;
 mod cases;
+mod cloud_files;
 mod clouds;
 mod folder;
 mod joined;
@@ -11,4 +12,5 @@ mod pieces;
 mod rubble;
 mod sheets;
 mod solids;
+mod split;
 mod write;
