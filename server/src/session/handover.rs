@@ -3,6 +3,7 @@
 //! Friction, stiffness, a colour or the pose of something else is changed, and the body stays where it is: the next session begins there and not at
 //! the scene's start. The device that this process opened stays open; one behind a bridge stays by itself.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -13,7 +14,7 @@ use taut_scene::BuiltMotion;
 
 use crate::loops::god_object::Stand;
 use crate::session::setup::{DeviceOrigin, DeviceSource, SessionSetup};
-use crate::shared::clock::SessionClock;
+use crate::shared::clock::{SessionClock, nanoseconds};
 
 /// What the loops leave when they end.
 #[derive(Default)]
@@ -29,7 +30,12 @@ pub(super) struct Before {
     start: Pose,
     motions: Vec<BuiltMotion>,
     device: DeviceOrigin,
+    /// Of a device that is of a session before.
+    ahead: Option<Ahead>,
 }
+
+/// How much the clock of a kept device is ahead of the session's, ns. Set anew for each session: a device is wrapped once, however many it serves.
+type Ahead = Arc<AtomicU64>;
 
 /// All that the next session gets.
 pub(crate) struct Handover {
@@ -91,6 +97,7 @@ impl Before {
             start: setup.start,
             motions: setup.motions.clone(),
             device: setup.device_origin.clone(),
+            ahead: None,
         }
     }
 
@@ -114,25 +121,24 @@ impl Handover {
         let Some(stand) = self.stand.as_ref().filter(|_| is_same) else {
             return (Duration::ZERO, Beginning::AtStart);
         };
-        let world = Arc::make_mut(&mut setup.world);
-        let mut at_start = Vec::new();
+        let at_start = setup.world.clone();
         for motion in &setup.motions {
+            // A copy of the world, where something moves: others hold the one of the start.
+            let world = Arc::make_mut(&mut setup.world);
             if let (Some(obstacle), Some(was)) = (
                 world.obstacles.get_mut(motion.obstacle),
                 stand.obstacles.get(motion.obstacle),
             ) {
-                at_start.push((motion.obstacle, std::mem::replace(&mut obstacle.pose, *was)));
+                obstacle.pose = *was;
             }
         }
-        match GodObject::check_start(world, &setup.settings, &stand.body) {
+        match GodObject::check_start(&setup.world, &setup.settings, &stand.body) {
             Ok(()) => {
                 setup.start = stand.body;
                 (stand.on_traces, Beginning::WhereItWas)
             }
             Err(error) => {
-                for (obstacle, pose) in at_start {
-                    world.obstacles[obstacle].pose = pose;
-                }
+                setup.world = at_start;
                 let why = match error {
                     StartError::Penetration { obstacle } | StartError::TooNear { obstacle, .. } => {
                         format!("there it would be in \"{obstacle}\" now")
@@ -144,21 +150,43 @@ impl Handover {
         }
     }
 
-    /// The device of before in the place of one that was opened as that was, on the clock of now.
+    /// The device of before in the place of one that was opened as that was, on the clock of now; `now` is of the session that gets it.
     pub(super) fn device(
         self,
         opened: DeviceSource,
-        origin: &DeviceOrigin,
+        now: &mut Before,
         clock: SessionClock,
     ) -> DeviceSource {
         match (opened, self.device) {
-            (DeviceSource::Local(_), Some(device)) if *origin == self.before.device => {
-                DeviceSource::Local(Box::new(KeptDevice {
-                    device,
-                    ahead: clock.since(&self.clock),
-                }))
+            (DeviceSource::Local(_), Some(device)) if now.device == self.before.device => {
+                let (device, ahead) = kept(device, self.before.ahead, clock.since(&self.clock));
+                now.ahead = Some(ahead);
+                DeviceSource::Local(device)
             }
             (opened, _) => opened,
+        }
+    }
+}
+
+/// A device for a session that began `later` than the one before, in which it was `ahead` already if it was kept then.
+fn kept(
+    device: Box<dyn Device>,
+    ahead: Option<Ahead>,
+    later: Duration,
+) -> (Box<dyn Device>, Ahead) {
+    let later = nanoseconds(later);
+    match ahead {
+        Some(ahead) => {
+            ahead.fetch_add(later, Ordering::Relaxed);
+            (device, ahead)
+        }
+        None => {
+            let ahead = Arc::new(AtomicU64::new(later));
+            let kept = KeptDevice {
+                device,
+                ahead: ahead.clone(),
+            };
+            (Box::new(kept), ahead)
         }
     }
 }
@@ -166,8 +194,13 @@ impl Handover {
 /// A device whose clock began with a session before.
 struct KeptDevice {
     device: Box<dyn Device>,
-    /// Its clock is so much ahead of the session's.
-    ahead: Duration,
+    ahead: Ahead,
+}
+
+impl KeptDevice {
+    fn ahead(&self) -> Duration {
+        Duration::from_nanos(self.ahead.load(Ordering::Relaxed))
+    }
 }
 
 impl Device for KeptDevice {
@@ -176,15 +209,16 @@ impl Device for KeptDevice {
     }
 
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
-        let sample = self.device.read(now + self.ahead)?;
+        let ahead = self.ahead();
+        let sample = self.device.read(now + ahead)?;
         Ok(DeviceSample {
-            time: sample.time.saturating_sub(self.ahead),
+            time: sample.time.saturating_sub(ahead),
             ..sample
         })
     }
 
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>) {
-        self.device.write(now + self.ahead, wrench);
+        self.device.write(now + self.ahead(), wrench);
     }
 
     fn let_go(&mut self) -> bool {
@@ -192,7 +226,7 @@ impl Device for KeptDevice {
     }
 
     fn comes_from(&mut self, origin: Option<Duration>, obstacle_work: f64) {
-        let origin = origin.map(|origin| origin + self.ahead);
+        let origin = origin.map(|origin| origin + self.ahead());
         self.device.comes_from(origin, obstacle_work);
     }
 
@@ -202,7 +236,7 @@ impl Device for KeptDevice {
 
     fn felt(&self) -> Option<Felt> {
         let felt = self.device.felt()?;
-        let set_made = felt.set_made.map(|made| made.saturating_sub(self.ahead));
+        let set_made = felt.set_made.map(|made| made.saturating_sub(self.ahead()));
         Some(Felt { set_made, ..felt })
     }
 
@@ -213,8 +247,6 @@ impl Device for KeptDevice {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicU64, Ordering};
-
     use taut_bridge::DeviceLimits;
 
     use super::*;
@@ -270,12 +302,15 @@ mod tests {
         let mut device: Box<dyn Device> = Box::new(told);
         let ms = Duration::from_millis;
         device.write(ms(5_000), &Vector6::zeros());
-        // The first session began 10 s before the second, and that 10 s before the third.
-        for _ in 0..2 {
-            device = Box::new(KeptDevice {
-                device,
-                ahead: ms(5_000),
-            });
+        // A hundred sessions more, each 0.1 s later than the one before.
+        let mut ahead = None;
+        for _ in 0..100 {
+            let told_before = ahead.is_some();
+            let place: *const dyn Device = &*device;
+            let (again, since) = kept(device, ahead, ms(100));
+            let is_same = std::ptr::addr_eq(place, &raw const *again);
+            assert_eq!(is_same, told_before, "wrapped once");
+            (device, ahead) = (again, Some(since));
         }
         let sample = device.read(ms(7)).expect("a sample");
         assert_eq!(sample.time, ms(5));
@@ -296,7 +331,7 @@ mod tests {
         };
         let mut device = KeptDevice {
             device: Box::new(told),
-            ahead: Duration::from_millis(9_990),
+            ahead: Arc::new(AtomicU64::new(9_990_000_000)),
         };
         device.comes_from(Some(Duration::from_millis(9)), 0.0);
         assert_eq!(device.info().name, "told");

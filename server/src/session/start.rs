@@ -65,7 +65,7 @@ impl Session {
         kept: &mut Continuity,
     ) -> Result<Self, Failure> {
         kept.switch.begin_again();
-        let before = Before::of(&setup);
+        let mut before = Before::of(&setup);
         let handover = kept.handover.take();
         let (on_traces, beginning) = match &handover {
             Some(handover) => handover.place(&mut setup),
@@ -76,7 +76,7 @@ impl Session {
         // The network, whose clock is everybody's; the device may be behind it.
         let clock = SessionClock::start();
         if let Some(handover) = handover {
-            setup.device = handover.device(setup.device, &setup.device_origin, clock);
+            setup.device = handover.device(setup.device, &mut before, clock);
         }
         let ledger = RealtimeLedger::default();
         let runtime = network_runtime(&ledger)?;
