@@ -507,6 +507,10 @@ fn shadows_of_what_stands_are_drawn_again_only_when_it_moves() {
     let (passes, moved) = draw(1e-4, Some(2e-3));
     assert_eq!(passes, first + 1);
     assert_ne!(moved, picture);
+    // What moves is drawn with the hand: on its way on, what stands is not drawn again.
+    let (passes, farther) = draw(1e-4, Some(3e-3));
+    assert_eq!(passes, first + 1);
+    assert_ne!(farther, moved);
     // Back again, by another way: the same picture.
     let (passes, back) = draw(1e-4, None);
     assert_eq!(passes, first + 2);

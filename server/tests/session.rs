@@ -259,6 +259,69 @@ fn clients_see_a_plate_rise_under_the_body_and_never_into_it() {
     assert_eq!(report.penetrations, 0);
 }
 
+/// A scene in a file of its own with a ball in the hand, and so much that goes along.
+fn scene_with_carried(folder: &Path, count: usize) -> String {
+    let mut text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { sphere = { radius = 0.01 } }\n\
+        pose = { position = [0.0, 0.0, 0.1] }\n\
+        [[obstacle]]\nname = \"post\"\nshape = { box = { half_extents = [0.01, 0.01, 0.01] } }\npose = { position = [0.2, 0.0, 0.0] }\n\
+        [[obstacle]]\nname = \"plate\"\nshape = { plane = {} }\npose = { position = [0.0, 0.0, -0.005] }\n"
+        .to_owned();
+    for number in 0..count {
+        let by = ["god-object", "device"][number % 2];
+        text += &format!(
+            "[[scenery]]\nname = \"thing {number}\"\nshape = {{ sphere = {{ radius = 0.01 }} }}\ncarried_by = \"{by}\"\n\
+             pose = {{ position = [0.0, 0.25, 0.5] }}\n"
+        );
+    }
+    let path = folder.join("carried.toml");
+    std::fs::write(&path, text).expect("cannot write");
+    path.display().to_string()
+}
+
+#[test]
+fn clients_see_what_is_carried_where_body_and_device_are() {
+    let folder = tempfile::tempdir().expect("no temporary directory");
+    let key = ClusterKey::generate().expect("no random numbers");
+    let scene = scene_with_carried(folder.path(), 2);
+    let session = Session::start(setup_of(&scene, key.clone())).expect("does not start");
+    let states = received(&session, key, |states| states.len() > 100);
+    let (_, failure) = session.stop(&Terminal::standard_error());
+    assert!(failure.is_none());
+    for received in &states {
+        let state = &received.state;
+        let tool = &state.tools[0];
+        let carriers = [&tool.god_object, &tool.device];
+        let ids: Vec<u16> = state.bodies.iter().map(|body| body.id).collect();
+        assert_eq!(ids, [2, 3], "after the obstacles");
+        for (body, carrier) in state.bodies.iter().zip(carriers) {
+            let [body, carrier] =
+                [&body.pose, carrier].map(|pose| pose.to_isometry().expect("rigid"));
+            let apart =
+                carrier * Point3::new(0.0, 0.25, 0.5) - Point3::from(body.translation.vector);
+            assert!(apart.norm() < 1e-6, "{state:?}");
+        }
+    }
+}
+
+#[test]
+fn more_that_is_carried_than_a_state_tells_of_is_refused() {
+    let folder = tempfile::tempdir().expect("no temporary directory");
+    for (count, fits) in [(12, true), (13, false)] {
+        let scene = format!("scene={:?}", scene_with_carried(folder.path(), count));
+        let key = ClusterKey::generate().expect("no random numbers");
+        match session_setup(&shipped_workbench(&[&scene]), key, &Overrides::default()) {
+            Ok(_) => assert!(fits),
+            Err(error) => {
+                let said = error.to_string();
+                assert!(
+                    !fits && said.contains("13 things that are carried"),
+                    "{said}"
+                );
+            }
+        }
+    }
+}
+
 /// One line of the stream of observers, until `wanted` takes one.
 fn line_of(
     reader: &mut impl BufRead,

@@ -79,9 +79,9 @@ struct Plan {
     light: KeyLight,
     stale: bool,
     reflections: bool,
-    /// Opaque bodies, which cast shadows: the god-object, if it is one, then obstacles.
+    /// Opaque bodies, which cast shadows: the god-object, if it is one, obstacles that move, then those that stand.
     casters: Vec<Batch>,
-    /// How many of the first of these are the god-object's: 1 or 0.
+    /// How many of the first of these move.
     moving: usize,
     /// Bodies through which others are seen.
     translucent: Vec<Batch>,

@@ -13,6 +13,7 @@ mod files;
 mod finished_file;
 mod height_map_file;
 mod import;
+mod lattice;
 mod mesh_file;
 mod picture;
 mod problem;
@@ -44,8 +45,8 @@ pub use picture::read_picture;
 pub use problem::{FileError, Problem};
 pub use runner::{Onlooker, Runner, numbers_of_pose, pose_of_numbers};
 pub use scene::{
-    BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec, EditedKey,
-    GOD_OBJECT_NAME, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MassSpec,
+    BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, Carried, Carrier, CouplingSpec,
+    EditedKey, GOD_OBJECT_NAME, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MassSpec,
     MethodSpec, MotionSpec, ObstacleSpec, Prepared, ReferencePoint, SHIPPED_SCENES, Scene,
     SceneSource, ScenerySpec, Shape, ShippedScene, Sources, View, shipped_scene_text,
 };

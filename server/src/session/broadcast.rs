@@ -15,6 +15,7 @@ use taut_proto::state::{
     TOOL_FORCE_LIMITED, ToolState,
 };
 use taut_proto::{HotState, PoseF32};
+use taut_scene::{Carried, Carrier};
 
 use crate::loops::shell::{Beat, run_at_deadlines};
 use crate::loops::wiring::SharedView;
@@ -72,6 +73,8 @@ pub struct StateWriter {
     head: Head,
     reference_point: Point3<f64>,
     scene_revision: u32,
+    /// By their numbers in the description.
+    carried: Vec<(u16, Carried)>,
     state: HotState,
     motion: MotionEstimate,
     events: EventSource,
@@ -94,6 +97,7 @@ impl StateWriter {
             head,
             reference_point: *reference_point,
             scene_revision,
+            carried: Vec::new(),
             state: HotState::empty(),
             motion: MotionEstimate::default(),
             events: EventSource::default(),
@@ -114,6 +118,18 @@ impl StateWriter {
     pub fn with_most_contacts(self, most_contacts: usize) -> Self {
         Self {
             most_contacts,
+            ..self
+        }
+    }
+
+    /// The same with scenery that is carried about; the scene has so many obstacles.
+    #[must_use]
+    pub fn with_carried(self, obstacles: usize, carried: &[Carried]) -> Self {
+        let numbered = carried.iter().map(|it| (obstacles + it.place, *it));
+        // No client can be told of a body beyond the numbers of the wire, and none has one.
+        let carried = numbered.filter_map(|(id, it)| Some((u16::try_from(id).ok()?, it)));
+        Self {
+            carried: carried.collect(),
             ..self
         }
     }
@@ -154,6 +170,25 @@ impl StateWriter {
             .push(tool_state(device, contacts, wrench, &self.motion.velocity));
         state.bodies.clear();
         state.bodies.extend(contacts.moving.iter().map(body_state));
+        for (id, carried) in &self.carried {
+            let mut moving = contacts.moving.iter();
+            let carrier = match carried.by {
+                Carrier::GodObject => Some(&contacts.set.god_object_pose),
+                Carrier::Device => Some(&device.pose),
+                Carrier::Obstacle(place) => moving
+                    .find(|moving| usize::from(moving.obstacle) == place)
+                    .map(|moving| &moving.pose),
+            };
+            let pose = carrier.map(|carrier| carrier * carried.pose);
+            // A session with more of them than a state holds is refused.
+            let _ = pose.map(|pose| {
+                state.bodies.try_push(BodyState {
+                    id: *id,
+                    flags: 0,
+                    pose: PoseF32::from_isometry(&pose),
+                })
+            });
+        }
         nearest_contacts(&contacts.set, &mut state.contacts);
         state.contacts.truncate(self.most_contacts);
         self.events.take(&mut state.events);
@@ -469,6 +504,48 @@ mod tests {
             state.events.last().map(|event| event.code),
             Some(event_code::FAULT)
         );
+    }
+
+    #[test]
+    fn what_is_carried_is_where_its_carrier_is() {
+        let start = Pose::translation(0.0, 0.0, 0.1);
+        let (mut states, mut contacts, _wrenches, writer) = wired(&start);
+        let up = Pose::translation(0.0, 0.0, 0.01);
+        let by = |place, by| Carried {
+            place,
+            by,
+            pose: up,
+        };
+        let carried = [
+            by(0, Carrier::GodObject),
+            by(2, Carrier::Device),
+            by(3, Carrier::Obstacle(3)),
+        ];
+        let mut writer = writer.with_carried(5, &carried);
+        states.publish(&DeviceState {
+            sequence: 1,
+            pose: Pose::translation(0.0, 0.0, 0.05),
+            ..DeviceState::at_start(&start)
+        });
+        let mut snapshot = ContactSnapshot::at_start(&start, 32);
+        snapshot.moving.push(MovingObstacle {
+            obstacle: 3,
+            pose: Pose::translation(0.0, 0.25, 0.0),
+        });
+        contacts.publish(&snapshot);
+        let state = writer.newest(Duration::from_millis(1)).expect("a sample");
+        let places: Vec<(u16, [f32; 3])> = state
+            .bodies
+            .iter()
+            .map(|body| (body.id, body.pose.position))
+            .collect();
+        let wanted = [
+            (3, [0.0, 0.25, 0.0]),
+            (5, [0.0, 0.0, 0.11]),
+            (7, [0.0, 0.0, 0.06]),
+            (8, [0.0, 0.25, 0.01]),
+        ];
+        assert_eq!(places, wanted);
     }
 
     #[test]

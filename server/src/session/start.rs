@@ -207,7 +207,8 @@ impl Session {
             &setup.world.body.reference_point,
             scene_revision,
         )
-        .with_most_contacts(most_contacts);
+        .with_most_contacts(most_contacts)
+        .with_carried(setup.world.obstacles.len(), &setup.carried);
         session.start_coupling(
             loops.coupling,
             loops.coupling_waker.clone(),

@@ -34,10 +34,16 @@ impl Renderer {
         };
         let god_object = god_object::instance(stage, &state.god_object);
         add(&stage.god_object, god_object, bounds);
-        let moving = usize::from(is_opaque(&stage.god_object));
         let mut all = bounds;
-        let seen = stage.obstacles.iter().enumerate();
-        for (place, body) in seen.filter(|(_, body)| body.opacity > 0.0) {
+        let mut moving = usize::from(is_opaque(&stage.god_object));
+        let moves = |body: &StageBody| state.bodies.iter().any(|(id, _)| *id == body.id);
+        let seen = || {
+            let seen = stage.obstacles.iter().enumerate();
+            seen.filter(|(_, body)| body.opacity > 0.0)
+        };
+        let moved = seen().filter(|(_, body)| moves(body));
+        let stands = seen().filter(|(_, body)| !moves(body));
+        for (place, body) in moved.chain(stands) {
             let pose = pose_of(body, state);
             let own = self.bounds(stage, body, pose);
             all = all.union(&own);
@@ -46,6 +52,7 @@ impl Renderer {
             }
             let shown = self.ground.shown(place, body);
             add(body, obstacles::instance(stage, &shown, pose), own);
+            moving += usize::from(is_opaque(body) && moves(body));
         }
 
         let (dot, arrow) = (self.meshes.len() - 2, self.meshes.len() - 1);

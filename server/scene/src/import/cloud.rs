@@ -17,8 +17,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::lattice::{INTERPOLATION, Samples, Site, beside, nearest_site};
 use super::point_tree::PointTree;
+use crate::lattice::{INTERPOLATION, Samples, Site, beside, nearest_site};
 use crate::mesh_file::RawMesh;
 use crate::progress::Progress;
 
@@ -131,13 +131,7 @@ impl Cloud {
             }
             let value = self.tree.distance(place(site, half).into()) - offset;
             let least = SNAP * pitch;
-            samples.index.insert(site, samples.sites.len() as u32);
-            samples.sites.push(site);
-            samples.values.push(if value < 0.0 {
-                value.min(-least)
-            } else {
-                value.max(least)
-            });
+            samples.add(site, value, least);
             Some(())
         };
         // Every site within r of a point is reached from the site nearest to that point over sites nearer to it.

@@ -39,13 +39,6 @@ pub(super) fn look_of(members: &[Member], body_file: &str) -> BodyLook {
         }
     }
     let name = largest.map_or("", |member| &member.name);
-    let opacity = |member: &&Member| member.look.appearance.opacity != appearance.opacity;
-    match members.iter().filter(opacity).count() {
-        0 => {}
-        others => lost.push(format!(
-            "the opacity of {others} of its files: all of the body has that of {name}"
-        )),
-    }
     let runs: Vec<Vec<(Appearance, usize)>> = members.iter().map(runs).collect();
     let mut looks: Vec<Appearance> = Vec::new();
     for (look, _) in runs.iter().flatten() {
@@ -71,18 +64,21 @@ pub(super) fn look_of(members: &[Member], body_file: &str) -> BodyLook {
     }
 }
 
-/// Lengths of runs of its triangles, with how each looks. The opacity is the body's.
+/// Lengths of runs of its triangles, with how each looks; one that is opaque says nothing of it.
 fn runs(member: &Member) -> Vec<(Appearance, usize)> {
+    let own = member.look.appearance.opacity;
+    let opacity = |of_part: Option<f32>| of_part.or(own).filter(|opacity| *opacity < 1.0);
     let of_file = |mesh| member.look.drawn_parts(&Appearance::default(), mesh);
     let of_file = member.as_read.as_ref().map(of_file).unwrap_or_default();
-    if !of_file.is_empty() {
-        return of_file;
-    }
-    let one = Appearance {
-        opacity: None,
-        ..member.look.appearance
+    let all = match of_file.is_empty() {
+        true => vec![(member.look.appearance, member.felt.triangles.len())],
+        false => of_file,
     };
-    vec![(one, member.felt.triangles.len())]
+    let with_opacity = |(look, count): (Appearance, usize)| {
+        let opacity = opacity(look.opacity);
+        (Appearance { opacity, ..look }, count)
+    };
+    all.into_iter().map(with_opacity).collect()
 }
 
 /// The textures of these runs; `None` where there are none.

@@ -9,7 +9,6 @@ mod faces;
 mod folder;
 mod hand_path;
 mod holes;
-mod lattice;
 mod looks;
 mod manifold;
 mod names;

@@ -149,10 +149,7 @@ fn write_look(text: &mut String, part: &Placed) {
             "visual = {{ mesh = {} }}    # drawn instead, with the looks of its materials; color = \"...\" gives all of it one",
             quoted(file)
         );
-        appearance = Appearance {
-            opacity: appearance.opacity,
-            ..Appearance::default()
-        };
+        appearance = Appearance::default();
     }
     if let Some(colour) = appearance.color {
         let _ = writeln!(text, "color = \"{}\"", text_of_colour(colour));

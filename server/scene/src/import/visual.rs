@@ -158,7 +158,11 @@ fn write_material(text: &mut String, number: usize, look: &Appearance) {
         let [red, green, blue] = colour.map(|part| encoded(f64::from(part)));
         let _ = writeln!(text, "Kd {red:.6} {green:.6} {blue:.6}");
     }
-    for (key, value) in [("Pr", look.roughness), ("Pm", look.metallic)] {
+    for (key, value) in [
+        ("d", look.opacity),
+        ("Pr", look.roughness),
+        ("Pm", look.metallic),
+    ] {
         if let Some(value) = value {
             let _ = writeln!(text, "{key} {value:?}");
         }

@@ -24,6 +24,24 @@ pub struct BodyTextures {
     pub coordinates: Vec<[[f32; 2]; 3]>,
 }
 
+impl BodyTextures {
+    /// One picture that no file holds, of the first of two looks.
+    pub(super) fn of_one(texture: Texture, coordinates: Vec<Corners>) -> Self {
+        let hash = MeshHash::of(&texture.encode());
+        let one = BodyTexture {
+            texture: Arc::new(texture),
+            hash,
+            wrap: [Wrap::Clamp; 2],
+            file: (Arc::default(), "png"),
+        };
+        Self {
+            list: vec![one],
+            of_looks: vec![Some(0), None],
+            coordinates,
+        }
+    }
+}
+
 /// A texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyTexture {
@@ -44,7 +62,6 @@ struct Picture {
     file: (Arc<[u8]>, &'static str),
     texture: Texture,
     size: (u32, u32),
-    has_holes: bool,
 }
 
 /// The pictures of the materials that are seen.
@@ -60,11 +77,10 @@ pub(super) struct Pictures {
 }
 
 impl Pictures {
-    /// Reads those of the materials at `places` of the list; `see_through`: the body shows what is behind it. What is lost goes to `lost`.
+    /// Reads those of the materials at `places` of the list. What is lost goes to `lost`.
     pub(super) fn read(
         list: &[Material],
         places: &[usize],
-        see_through: bool,
         directory: Option<&Path>,
         lost: &mut Vec<String>,
     ) -> Self {
@@ -77,16 +93,9 @@ impl Pictures {
             let Some(used) = &list[place].picture else {
                 continue;
             };
-            let with_opacity = see_through && used.is_opacity;
-            let Some(picture) = all.picture(used, with_opacity, directory, lost) else {
+            let Some(picture) = all.picture(used, used.is_opacity, directory, lost) else {
                 continue;
             };
-            if used.is_cut_out && all.read[picture].has_holes {
-                let name = used.source.name();
-                lost.push(format!(
-                    "the holes in its texture \"{name}\" (alphaMode MASK): it is drawn opaque"
-                ));
-            }
             let texture = (picture, used.wrap);
             let known = all.textures.iter().position(|known| *known == texture);
             if known.is_none() && all.textures.len() == MAX_TEXTURES {
@@ -141,8 +150,7 @@ impl Pictures {
             size,
             ending,
         } = picture;
-        let has_holes = !texture.is_opaque();
-        if has_holes && !with_opacity {
+        if !with_opacity && !texture.is_opaque() {
             texture = opaque(&texture);
         }
         self.read.push(Picture {
@@ -151,7 +159,6 @@ impl Pictures {
             file: (bytes, ending),
             texture,
             size,
-            has_holes,
         });
         Some(self.read.len() - 1)
     }

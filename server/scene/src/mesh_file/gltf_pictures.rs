@@ -28,8 +28,7 @@ pub(super) fn picture(of: &gltf::Material<'_>, buffers: &[Vec<u8>]) -> Option<Pi
         set: set.unwrap_or(info.tex_coord()),
         wrap: [sampler.wrap_s(), sampler.wrap_t()].map(wrap),
         placing: transform.map_or(AS_IT_LIES, |t| placing(&t)),
-        is_opacity: of.alpha_mode() == AlphaMode::Blend,
-        is_cut_out: of.alpha_mode() == AlphaMode::Mask,
+        is_opacity: of.alpha_mode() != AlphaMode::Opaque,
     })
 }
 

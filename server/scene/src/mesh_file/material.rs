@@ -4,6 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
+use taut_proto::Texture;
 use taut_proto::mesh_blob::MAX_LOOKS;
 
 use super::RawMesh;
@@ -15,6 +16,11 @@ use crate::appearance::Appearance;
 
 /// Most materials that nobody defines which are named.
 const MAX_UNDEFINED: usize = 3;
+
+/// A hand's skin, that of a clay model, and the cloth of its cuff; a board's paper. Linear RGB.
+const SKIN: [f32; 3] = [0.62, 0.47, 0.38];
+const CLOTH: [f32; 3] = [0.035, 0.06, 0.12];
+const PAPER: [f32; 3] = [0.83, 0.82, 0.79];
 
 /// A material of a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,9 +68,43 @@ pub(crate) struct FileLook {
     pub(crate) merged: Option<String>,
     /// What else the file says and nobody draws, as parts of a sentence.
     pub(crate) lost: Vec<String>,
+    /// A colour that a scene says is that of each part, and leaves its texture: of a shape whose parts are its own.
+    keeps_parts: bool,
 }
 
 impl FileLook {
+    /// The look of a hand: so many of its triangles are skin, the others the cuff.
+    pub(crate) fn of_hand(skin: usize, all: usize) -> Self {
+        let of = |color, roughness| Appearance {
+            color: Some(color),
+            roughness: Some(roughness),
+            ..Appearance::default()
+        };
+        let parts = vec![(of(SKIN, 0.55), skin), (of(CLOTH, 0.95), all - skin)];
+        Self {
+            appearance: parts[0].0,
+            parts,
+            ..Self::default()
+        }
+    }
+
+    /// The look of a board: its first two triangles show this, where the coordinates say.
+    pub(crate) fn of_board(front: Texture, coordinates: Vec<Corners>) -> Self {
+        let appearance = Appearance {
+            color: Some(PAPER),
+            roughness: Some(0.9),
+            ..Appearance::default()
+        };
+        let others = coordinates.len().saturating_sub(2);
+        Self {
+            appearance,
+            parts: vec![(appearance, 2), (appearance, others)],
+            textures: Some(Arc::new(BodyTextures::of_one(front, coordinates))),
+            keeps_parts: true,
+            ..Self::default()
+        }
+    }
+
     /// How each run of the triangles of a drawn mesh looks where a scene says `said` of the body: empty where all look alike, as the scene says by
     /// a colour, or where the drawn triangles are not those of the file.
     pub(crate) fn drawn_parts(
@@ -73,7 +113,8 @@ impl FileLook {
         drawn: &RawMesh,
     ) -> Vec<(Appearance, usize)> {
         let count: usize = self.parts.iter().map(|(_, count)| count).sum();
-        if said.color.is_some() || count != drawn.triangles.len() {
+        let is_one = said.color.is_some() && !self.keeps_parts;
+        if is_one || count != drawn.triangles.len() {
             return Vec::new();
         }
         let parts = self.parts.iter();
@@ -184,7 +225,7 @@ impl Materials {
             .iter()
             .copied()
             .reduce(|a, b| if areas[b] > areas[a] { b } else { a });
-        let (factors, textures) = self.textures(mesh, &places, largest, directory, &mut lost);
+        let (factors, textures) = self.textures(mesh, &places, directory, &mut lost);
         let of = |place: usize| self.list.get(place).cloned().unwrap_or_default();
         let material = largest.map(of).unwrap_or_default();
         let others = places
@@ -197,20 +238,9 @@ impl Materials {
                 material.name
             )
         });
-        let opaque = material.appearance.opacity;
-        let others = places
-            .iter()
-            .filter(|place| of(**place).appearance.opacity != opaque);
-        match others.count() {
-            0 => {}
-            others => lost.push(format!(
-                "the opacity of {others} of its materials: all of the body has that of \"{}\"",
-                material.name
-            )),
-        }
         let (mut parts, mut textured) = (Vec::new(), None);
         if (merged.is_some() || textures.is_some()) && places.len() <= MAX_LOOKS {
-            (parts, textured) = self.parts(of, &factors, textures);
+            (parts, textured) = self.parts(of, material.appearance.opacity, &factors, textures);
         }
         // A library that cannot be read is said above, and may define them.
         let undefined = places.iter().filter_map(|place| self.list.get(*place));
@@ -236,6 +266,7 @@ impl Materials {
             textures: textured.map(Arc::new),
             merged,
             lost,
+            keeps_parts: false,
         }
     }
 

@@ -29,10 +29,8 @@ pub(super) struct PictureUse {
     pub(super) wrap: [Wrap; 2],
     /// Rows of the map from the file's coordinates, v down, to those of the picture: factors of u, v and 1.
     pub(super) placing: [[f64; 3]; 2],
-    /// Its fourth channel is the opacity.
+    /// Its fourth channel is the opacity. Where a file says that it cuts holes (`alphaMode` MASK) their edges are soft.
     pub(super) is_opacity: bool,
-    /// Its fourth channel cuts holes, which are not drawn.
-    pub(super) is_cut_out: bool,
 }
 
 /// Leaves coordinates as they are.
@@ -47,7 +45,6 @@ impl PictureUse {
             wrap: [Wrap::Repeat; 2],
             placing: AS_IT_LIES,
             is_opacity: false,
-            is_cut_out: false,
         }
     }
 

@@ -21,14 +21,6 @@ pub(super) struct ReadTextures {
     body: BodyTextures,
 }
 
-impl Material {
-    /// Whether it shows what is behind it.
-    fn is_see_through(&self) -> bool {
-        let by_picture = self.picture.as_ref().is_some_and(|used| used.is_opacity);
-        by_picture || self.appearance.opacity.is_some_and(|opacity| opacity < 1.0)
-    }
-}
-
 impl Materials {
     /// Reads the pictures of the materials at `places`. Colours of materials become those of their pictures on the whole; what they were, as factors, and the
     /// textures with the place of each material's.
@@ -36,14 +28,11 @@ impl Materials {
         &mut self,
         mesh: &RawMesh,
         places: &[usize],
-        largest: Option<usize>,
         directory: Option<&Path>,
         lost: &mut Vec<String>,
     ) -> (Vec<Option<[f32; 3]>>, Option<ReadTextures>) {
         let factors: Vec<_> = self.list.iter().map(|of| of.appearance.color).collect();
-        let on_most = largest.and_then(|place| self.list.get(place));
-        let see_through = on_most.is_some_and(Material::is_see_through);
-        let pictures = Pictures::read(&self.list, places, see_through, directory, lost);
+        let pictures = Pictures::read(&self.list, places, directory, lost);
         let drawn = (mesh, &self.runs[..]);
         let laid_out = lay_out(drawn, &self.coordinates, (&self.list, &pictures), lost);
         for (place, material) in self.list.iter_mut().enumerate() {
@@ -82,10 +71,11 @@ impl Materials {
         (factors, Some(textures))
     }
 
-    /// Runs of triangles that look alike, and their textures. The opacity is the body's.
+    /// Runs of triangles that look alike, and their textures. One says its opacity where that is not the body's.
     pub(super) fn parts(
         &self,
         of: impl Fn(usize) -> Material,
+        of_body: Option<f32>,
         factors: &[Option<[f32; 3]>],
         textures: Option<ReadTextures>,
     ) -> (Vec<(Appearance, usize)>, Option<BodyTextures>) {
@@ -93,10 +83,9 @@ impl Materials {
         let mut of_parts: Vec<Option<usize>> = Vec::new();
         for (material, count) in &self.runs {
             let place = material.unwrap_or(self.list.len());
-            let mut look = Appearance {
-                opacity: None,
-                ..of(place).appearance
-            };
+            let mut look = of(place).appearance;
+            let opacity = look.opacity.unwrap_or(1.0);
+            look.opacity = (opacity != of_body.unwrap_or(1.0)).then_some(opacity);
             let texture = textures
                 .as_ref()
                 .and_then(|read| *read.of_materials.get(place)?);

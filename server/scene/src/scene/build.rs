@@ -1,18 +1,16 @@
 //! From a scene to what the method works on: meshes loaded or generated, masses, settings.
 
-use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 use god_object::geometry::mass_properties;
-use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Settings, Texture, World};
+use god_object::{Body, GodObject, Mesh, Obstacle, Settings, Texture, World};
 use nalgebra::{Matrix3, Vector3};
 
 use super::auto_fidelity::AutoFidelity;
-use super::built::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
+use super::built::{BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
 use super::load::{Scene, unusable};
 use super::prepared::{Prepared, Source, Sources};
-use super::spec::{MassSpec, ObstacleSpec, ReferencePoint, Shape, VisualSpec};
-use crate::appearance::Appearance;
+use super::spec::{MassSpec, ObstacleSpec, ReferencePoint, Shape};
 use crate::check::MeshFigures;
 use crate::document::At;
 use crate::mesh_file::{FileLook, RawMesh};
@@ -28,9 +26,6 @@ const MASSES: RangeInclusive<f64> = 1e-6..=1e6;
 const DRAWN_SUBDIVISIONS: u32 = 4;
 const DRAWN_MERIDIANS: usize = 48;
 const DRAWN_SIDES: usize = 72;
-
-/// What is drawn of a body: form, mesh and look.
-type Drawn<'s> = (&'s Shape, RawMesh, FileLook);
 
 impl Scene {
     /// Loads and generates the meshes and checks that the method can work on them. All faults are reported.
@@ -57,7 +52,7 @@ impl Scene {
             .iter()
             .map(|o| made(&o.shape, &o.shape_at, &mut problems))
             .unzip();
-        let (scenery, scenery_lost) = self.built_scenery(&mut problems);
+        let mut seen = self.built_scenery(&mut problems);
         let visuals = self.visuals(&mut problems);
         let environment = self.environment().unwrap_or_else(|problem| {
             problems.push(problem);
@@ -102,13 +97,8 @@ impl Scene {
             return Err(spec.god_object.at.problem(text).into());
         }
         let obstacles = self.built_obstacles(obstacle_meshes, textures, auto.as_ref(), &motions);
-        let (bodies, mut lost_looks) = self.drawn_bodies(
-            &body.mesh,
-            &obstacles,
-            &[vec![body_look], looks].concat(),
-            visuals,
-        );
-        lost_looks.extend(scenery_lost);
+        let looks = [vec![body_look], looks].concat();
+        let bodies = self.drawn_bodies((&body.mesh, &obstacles), &looks, visuals, &mut seen);
         let hand = spec.hand.as_ref().zip(hand_path);
         let world = World { body, obstacles };
         GodObject::check_start(&world, &settings, &spec.god_object.pose)
@@ -125,8 +115,9 @@ impl Scene {
             }),
             motions,
             bodies,
-            scenery,
-            lost_looks: lost_looks.into_iter().collect(),
+            scenery: seen.scenery,
+            carried: seen.carried,
+            lost_looks: seen.lost.into_iter().collect(),
             simplified,
             sources: Sources::new(sources),
             view: spec.view,
@@ -214,73 +205,6 @@ impl Scene {
         obstacles
     }
 
-    /// God-object and obstacles as they are drawn, and what is lost of their looks.
-    fn drawn_bodies(
-        &self,
-        body: &Mesh,
-        obstacles: &[Obstacle],
-        looks: &[FileLook],
-        visuals: Vec<Option<Drawn<'_>>>,
-    ) -> (Vec<BuiltBody>, BTreeSet<String>) {
-        let held = &self.spec.god_object;
-        let held = (
-            GOD_OBJECT_NAME,
-            body,
-            held.pose,
-            (&held.shape, &held.appearance),
-        );
-        let obstacles = obstacles.iter().zip(&self.spec.obstacles);
-        let obstacles = obstacles.map(|(obstacle, spec)| {
-            let said = (&spec.shape, &spec.appearance);
-            (obstacle.name.as_str(), &obstacle.mesh, obstacle.pose, said)
-        });
-        let (mut bodies, mut lost) = (Vec::new(), BTreeSet::new());
-        let all = std::iter::once(held)
-            .chain(obstacles)
-            .zip(looks)
-            .zip(visuals);
-        for (((name, mesh, pose, (shape, said)), look), visual) in all {
-            let (shape, raw, look) = match visual {
-                Some((shape, raw, look)) => (shape, raw, look),
-                None => (shape, RawMesh::from(mesh), look.clone()),
-            };
-            let (body, lost_of) = drawn_body((name, pose, said), shape, raw, &look);
-            bodies.push(body);
-            lost.extend(lost_of);
-        }
-        (bodies, lost)
-    }
-
-    /// What is drawn of bodies instead of their forms: form, mesh and look; the god-object first.
-    fn visuals<'s>(&'s self, problems: &mut Vec<Problem>) -> Vec<Option<Drawn<'s>>> {
-        let obstacles = self.spec.obstacles.iter().map(|o| &o.visual);
-        let all = std::iter::once(&self.spec.god_object.visual).chain(obstacles);
-        let mut read = |visual: Option<&'s VisualSpec>| {
-            let visual = visual?;
-            let read = self.raw_mesh(&visual.shape, &visual.at);
-            let read = read.map_err(|error| problems.extend(error.into_problems()));
-            read.ok().map(|(mesh, look)| (&visual.shape, mesh, look))
-        };
-        all.map(|visual| read(visual.as_ref())).collect()
-    }
-
-    /// What is only seen, and what is lost of its look.
-    fn built_scenery(&self, problems: &mut Vec<Problem>) -> (Vec<BuiltBody>, BTreeSet<String>) {
-        let (mut scenery, mut lost) = (Vec::new(), BTreeSet::new());
-        for spec in &self.spec.scenery {
-            match self.raw_mesh(&spec.shape, &spec.shape_at) {
-                Ok((mesh, look)) => {
-                    let of = (spec.name.as_str(), spec.pose, &spec.appearance);
-                    let (body, lost_of) = drawn_body(of, &spec.shape, mesh, &look);
-                    scenery.push(body);
-                    lost.extend(lost_of);
-                }
-                Err(error) => problems.extend(error.into_problems()),
-            }
-        }
-        (scenery, lost)
-    }
-
     /// Traces of the obstacles that move.
     fn motions(&self, problems: &mut Vec<Problem>) -> Vec<BuiltMotion> {
         let obstacles = self.spec.obstacles.iter().enumerate();
@@ -339,7 +263,11 @@ impl Scene {
     }
 
     /// The surface of a shape of this scene, not yet checked for being closed, and how its file says that it looks.
-    fn raw_mesh(&self, shape: &Shape, at: &At) -> Result<(RawMesh, FileLook), FileError> {
+    pub(super) fn raw_mesh(
+        &self,
+        shape: &Shape,
+        at: &At,
+    ) -> Result<(RawMesh, FileLook), FileError> {
         let mesh = match *shape {
             Shape::Mesh {
                 ref path,
@@ -376,6 +304,17 @@ impl Scene {
             Shape::Plane { plate, axis } => {
                 let [size, thickness] = plate.unwrap_or(shapes::PLATE);
                 shapes::plane(size, thickness, axis)
+            }
+            Shape::Hand { length, is_left } => {
+                let (mesh, of_skin) = shapes::hand(length, is_left);
+                let look = FileLook::of_hand(of_skin, mesh.triangles.len());
+                return Ok((mesh, look));
+            }
+            Shape::Board { ref text, width } => {
+                let board = shapes::board(text, width)
+                    .ok_or_else(|| at.problem("the board's text does not fit; write less"))?;
+                let look = FileLook::of_board(board.front, board.coordinates);
+                return Ok((board.mesh, look));
             }
         };
         Ok((mesh, FileLook::default()))
@@ -461,26 +400,6 @@ fn simplify_as_asked(
     let (coarser, report) = simplify(mesh.take()?, max_error, name);
     *mesh = Some(coarser);
     Some(report)
-}
-
-/// A body as it is drawn, and what is lost of the look of its file.
-fn drawn_body(
-    (name, pose, said): (&str, Pose, &Appearance),
-    shape: &Shape,
-    mesh: RawMesh,
-    look: &FileLook,
-) -> (BuiltBody, Option<String>) {
-    let lost = shape.file().zip(look.not_drawn(said, &mesh));
-    let lost = lost.map(|(file, lost)| format!("of the look of \"{file}\" is not drawn: {lost}"));
-    let body = BuiltBody {
-        name: name.to_owned(),
-        looks: look.drawn_parts(said, &mesh),
-        textures: look.drawn_textures(said, &mesh),
-        mesh,
-        pose,
-        appearance: said.or(look.appearance),
-    };
-    (body, lost)
 }
 
 /// What a mass adds to the inertia about a point `offset` away (parallel axes).

@@ -9,7 +9,7 @@ use taut_plant::HandPreset;
 use taut_proto::Panorama;
 
 use super::prepared::Sources;
-use super::spec::View;
+use super::spec::{Carrier, View};
 use crate::appearance::Appearance;
 use crate::fidelity::FidelityPlan;
 use crate::mesh_file::{BodyTextures, RawMesh};
@@ -34,6 +34,17 @@ pub struct BuiltBody {
     pub looks: Vec<(Appearance, usize)>,
     /// Textures of these looks, if any has one.
     pub textures: Option<Arc<BodyTextures>>,
+}
+
+/// A piece of what is drawn besides that goes where its carrier goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carried {
+    /// Index in the scenery.
+    pub place: usize,
+    /// What carries it.
+    pub by: Carrier,
+    /// Carrier from scenery.
+    pub pose: Pose,
 }
 
 /// How an obstacle moves.
@@ -98,8 +109,10 @@ pub struct BuiltScene {
     pub motions: Vec<BuiltMotion>,
     /// What is drawn: the god-object first, then the obstacles in order.
     pub bodies: Vec<BuiltBody>,
-    /// What is drawn besides and never touched: no closed surfaces, maybe.
+    /// What is drawn besides and never touched: the scene's scenery, then parts of bodies of another opacity than they. No closed surfaces, maybe.
     pub scenery: Vec<BuiltBody>,
+    /// What of it does not stand.
+    pub carried: Vec<Carried>,
     /// What mesh files say of their look and is not drawn: a sentence for each file.
     pub lost_looks: Vec<String>,
     /// How meshes were simplified, for each shape that asks for it.

@@ -3,9 +3,11 @@
 mod auto_fidelity;
 mod build;
 mod built;
+mod drawn;
 mod edit;
 mod file_faults;
 mod load;
+mod opacities;
 mod parse;
 mod parse_look;
 mod parse_mesh_file;
@@ -15,7 +17,7 @@ mod settings_tables;
 mod shipped;
 mod spec;
 
-pub use built::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
+pub use built::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, Carried, GOD_OBJECT_NAME};
 pub use edit::EditedKey;
 pub(crate) use edit::RESERVED_NAMES;
 pub(crate) use file_faults::file_faults;
@@ -28,6 +30,6 @@ pub use prepared::{Prepared, Sources};
 pub use settings_tables::{CouplingSpec, LimitSpec, MethodSpec};
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
-    BodySpec, HandPathSpec, HeightMapMapping, HeightMapSpec, MassSpec, MotionSpec, ObstacleSpec,
-    ReferencePoint, ScenerySpec, Shape, View,
+    BodySpec, Carrier, HandPathSpec, HeightMapMapping, HeightMapSpec, MassSpec, MotionSpec,
+    ObstacleSpec, ReferencePoint, ScenerySpec, Shape, View,
 };

@@ -1,13 +1,18 @@
 //! How bodies look, and what is only seen, out of a scene file.
 
 use super::edit::object_name;
-use super::parse_shape::{pose, shape};
-use super::spec::{ObstacleSpec, ScenerySpec, Shape};
+use super::parse_shape::{pose, seen_shape};
+use super::spec::{Carrier, ObstacleSpec, ScenerySpec, Shape};
 use crate::appearance::{Appearance, colour_of_text};
 use crate::document::{Range, Section, Value};
 
 /// Most pieces of scenery: with the obstacles they fit a description on the wire.
 const MAX_SCENERY: usize = 1024;
+
+const CARRIERS: [(&str, Carrier); 2] = [
+    ("god-object", Carrier::GodObject),
+    ("device", Carrier::Device),
+];
 
 /// `[[scenery]]`: what is drawn and never touched.
 pub(super) fn scenery(root: &Section<'_>, obstacles: &[ObstacleSpec]) -> Vec<ScenerySpec> {
@@ -29,7 +34,8 @@ pub(super) fn scenery(root: &Section<'_>, obstacles: &[ObstacleSpec]) -> Vec<Sce
             }
         }
         let shape_at = at("shape").clone();
-        let (shape, pose) = (shape(&section), pose(&section));
+        let (shape, pose) = (seen_shape(&section), pose(&section));
+        let carrier = section.choice("carried_by", &CARRIERS);
         if let Some(Shape::Mesh {
             simplify: Some(_), ..
         }) = &shape
@@ -44,6 +50,7 @@ pub(super) fn scenery(root: &Section<'_>, obstacles: &[ObstacleSpec]) -> Vec<Sce
                 name,
                 shape,
                 pose,
+                carrier,
                 appearance,
                 shape_at,
             });

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use super::parse_mesh_file::mesh_file;
 use super::spec::{HeightMapMapping, HeightMapSpec, Shape, VisualSpec};
 use crate::document::{Range, Section, Value};
-use crate::shapes::{Axis, PLATE, hole_circumradius};
+use crate::shapes::{Axis, BoardText, PLATE, board_fault, hole_circumradius};
 use taut_recording::unit_quaternion;
 
 /// Sides of a prism: fewer make no prism, more make slivers that no hand feels.
@@ -17,6 +17,8 @@ const ROUND_FACETS: (i64, i64) = (8, 4096);
 const MAX_SUBDIVISIONS: i64 = 8;
 /// Sides of a hole that names none, as in the paper.
 const HOLE_FACETS: usize = 66;
+/// Length of a hand that names none, m: the mean of adults.
+const HAND: f64 = 0.19;
 /// Largest angle between faces, rad.
 const HALF_TURN: f64 = std::f64::consts::PI;
 
@@ -25,8 +27,20 @@ const AXES: [(&str, Axis); 3] = [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)]
 /// Reads one primitive's table.
 type ReadPrimitive = fn(&Section<'_>) -> Option<Shape>;
 
-/// `shape = { ... }`; complaints go to the section.
+/// `shape = { ... }` of what is touched; complaints go to the section.
 pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
+    let shape = shape_of(body, "shape")?;
+    if matches!(shape, Shape::Hand { .. } | Shape::Board { .. }) {
+        let at = body.get("shape").map_or(body.at(), |node| &node.at);
+        let text = "`hand` and `board` are only seen; write them as the shape of a [[scenery]], or as a `visual`";
+        body.complain(at, text);
+        return None;
+    }
+    Some(shape)
+}
+
+/// The same of what is only seen.
+pub(super) fn seen_shape(body: &Section<'_>) -> Option<Shape> {
     shape_of(body, "shape")
 }
 
@@ -56,13 +70,15 @@ fn shape_of(body: &Section<'_>, key: &'static str) -> Option<Shape> {
     };
     let mut found = Vec::new();
     found.extend(mesh_file(&shape).map(Some));
-    let primitives: [(&'static str, ReadPrimitive); 6] = [
+    let primitives: [(&'static str, ReadPrimitive); 8] = [
         ("sphere", sphere),
         ("box", cuboid),
         ("capsule", capsule),
         ("cylinder", cylinder),
         ("box_with_hole", box_with_hole),
         ("plane", plane),
+        ("hand", hand),
+        ("board", board),
     ];
     for (key, read) in primitives {
         if let Some(primitive) = shape.section(key) {
@@ -185,6 +201,34 @@ fn plane(section: &Section<'_>) -> Option<Shape> {
     Some(Shape::Plane {
         plate: bounded.then_some([size, thickness]),
         axis,
+    })
+}
+
+fn hand(section: &Section<'_>) -> Option<Shape> {
+    let sides = [("right", false), ("left", true)];
+    Some(Shape::Hand {
+        length: section.number_or("length", Range::Positive, HAND),
+        is_left: section.choice("side", &sides).unwrap_or(false),
+    })
+}
+
+fn board(section: &Section<'_>) -> Option<Shape> {
+    let written = |key| section.text(key).unwrap_or_default().to_owned();
+    let text = BoardText {
+        title: written("title"),
+        text: written("text"),
+    };
+    if text.title.is_empty() && text.text.is_empty() {
+        section.complain_missing("title", "title = \"Peg in a hole\"");
+    }
+    let width = section.required_number("width", Range::Positive, "width = 0.3");
+    if let Some(fault) = board_fault(&text) {
+        section.complain(section.at(), format!("{} {fault}", section.name()));
+        return None;
+    }
+    Some(Shape::Board {
+        text,
+        width: width?,
     })
 }
 

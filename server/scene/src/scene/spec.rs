@@ -6,7 +6,9 @@ use taut_plant::HandPreset;
 
 use crate::appearance::Appearance;
 use crate::document::At;
-use crate::shapes::{Axis, PLATE, exact_capsule, exact_cylinder, exact_plane, exact_sphere};
+use crate::shapes::{
+    Axis, BoardText, PLATE, exact_capsule, exact_cylinder, exact_plane, exact_sphere,
+};
 
 /// The form of a body.
 ///
@@ -79,6 +81,31 @@ pub enum Shape {
         /// The normal.
         axis: Axis,
     },
+    /// A hand, which is only seen: thumb and index finger meet at the origin.
+    Hand {
+        /// Wrist to the tip of the middle finger, m.
+        length: f64,
+        /// Of the left side.
+        is_left: bool,
+    },
+    /// A board with a text, which is only seen.
+    Board {
+        /// What is written on it.
+        text: BoardText,
+        /// m; it is as high as its text.
+        width: f64,
+    },
+}
+
+/// What carries a piece of scenery.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Carrier {
+    /// The body in the hand, where the constraints let it be.
+    GodObject,
+    /// The device: where the hand is.
+    Device,
+    /// The obstacle at this place, which moves: no file says so.
+    Obstacle(usize),
 }
 
 impl Shape {
@@ -208,8 +235,10 @@ pub struct ScenerySpec {
     pub name: String,
     /// Its form; a mesh need not be closed.
     pub shape: Shape,
-    /// World from scenery.
+    /// World from scenery; of what is carried, carrier from scenery.
     pub pose: Pose,
+    /// What carries it; `None` stands still.
+    pub carrier: Option<Carrier>,
     /// How it looks.
     pub appearance: Appearance,
     pub(crate) shape_at: At,

@@ -1,6 +1,7 @@
 //! The scene as the operator's page shows it: what can be changed of it, and how that is now.
 
 use serde::Serialize;
+use taut_proto::PoseF64;
 use taut_proto::scene::BodyDescription;
 use taut_scene::{Scene, srgb};
 
@@ -80,7 +81,8 @@ pub(crate) fn objects_of(setup: &SessionSetup) -> String {
         let is_obstacle = i < obstacles;
         (body, if is_obstacle { "obstacle" } else { "scenery" })
     });
-    let all = 1 + described.obstacles.len();
+    // What follows is parts of bodies that are drawn by themselves.
+    let all = 1 + obstacles + scene.scenery().len();
     let view = SceneView {
         coupling: CouplingView {
             k_h: settings.k_h,
@@ -90,7 +92,7 @@ pub(crate) fn objects_of(setup: &SessionSetup) -> String {
         },
         objects: held
             .chain(others)
-            .take(MAX_SHOWN)
+            .take(all.min(MAX_SHOWN))
             .enumerate()
             .map(|(place, (body, kind))| object(scene, place, body, kind))
             .collect(),
@@ -115,6 +117,11 @@ fn object<'v>(
             scenery.map(|scenery| &scenery.appearance)
         }
     };
+    let scenery = place.checked_sub(1 + scene.obstacles().len());
+    let carried = scenery.and_then(|i| scene.scenery().get(i));
+    let carried = carried.filter(|it| it.carrier.is_some());
+    // Of what is carried, the pose that the scene says: that is what an edit sets.
+    let pose = carried.map_or(body.pose, |it| PoseF64::from_isometry(&it.pose));
     let [red, green, blue, opacity] = body.colour;
     let [r, g, b] = srgb([red, green, blue]);
     ObjectView {
@@ -123,8 +130,8 @@ fn object<'v>(
             _ => body.name.raw(),
         },
         kind,
-        position: body.pose.position,
-        rotation: body.pose.rotation,
+        position: pose.position,
+        rotation: pose.rotation,
         color: format!("#{r:02x}{g:02x}{b:02x}"),
         opacity,
         roughness: look.and_then(|look| look.roughness),

@@ -22,7 +22,7 @@ use taut_bridge::{
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
-use taut_scene::{BuiltHand, BuiltMotion, FidelityPlan, Prepared, Scene, WrenchSource};
+use taut_scene::{BuiltHand, BuiltMotion, Carried, FidelityPlan, Prepared, Scene, WrenchSource};
 
 use crate::loops::checker::PenetrationChecker;
 use crate::loops::realtime::RealtimePolicy;
@@ -47,6 +47,8 @@ pub struct SessionSetup {
     /// How obstacles move; nothing for those that stand still. At most
     /// [`MAX_MOVING`](crate::shared::contact_snapshot::MAX_MOVING).
     pub motions: Vec<BuiltMotion>,
+    /// What is drawn and goes where something else goes; with the motions at most as many.
+    pub carried: Vec<Carried>,
     /// Of the method.
     pub settings: Settings,
     /// Where god-object and device start.

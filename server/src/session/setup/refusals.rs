@@ -106,11 +106,17 @@ pub(super) fn no_token_is_the_key(workbench: &Workbench, key: &ClusterKey) -> Re
 
 /// Refuses a scene in which more moves than clients can be told of.
 pub(super) fn few_motions(built: &BuiltScene) -> Result<(), Failure> {
-    if built.motions.len() <= MAX_MOVING {
+    if built.motions.len() + built.carried.len() <= MAX_MOVING {
         return Ok(());
     }
+    let scenery = match built.carried.len() {
+        0 => String::new(),
+        more => format!(
+            " and {more} things that are carried along (`carried_by`, and parts of moving bodies of another opacity)"
+        ),
+    };
     Err(Failure::BadInput(format!(
-        "the scene \"{}\" has {} obstacles with a motion, but a session can tell its clients of {MAX_MOVING}; leave some `motion` out, or use `taut replay`",
+        "the scene \"{}\" has {} obstacles with a motion{scenery}, but a session can tell its clients of {MAX_MOVING}; leave some `motion` or `carried_by` out, or give a body one `opacity`, or use `taut replay`",
         built.name,
         built.motions.len()
     )))

@@ -160,6 +160,7 @@ pub fn session_setup(
         device,
         device_origin,
         motions: built.motions,
+        carried: built.carried,
         settings: built.settings,
         start: built.start,
         world,

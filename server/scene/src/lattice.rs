@@ -19,10 +19,10 @@ use crate::mesh_file::RawMesh;
 ///
 /// A function that changes by at most 1 per metre differs from its linear interpolation within the tetrahedron by at most this times a: at p, with the shares l_i of
 /// the corners v_i, by at most sum l_i |v_i - p| <= sqrt(sum l_i |v_i - p|^2) = sqrt(R^2 - |p - c|^2) <= R, where c is the middle of that ball and R its radius.
-pub(super) const INTERPOLATION: f64 = 0.559_016_994_374_947_5;
+pub(crate) const INTERPOLATION: f64 = 0.559_016_994_374_947_5;
 
 /// A site, in halves of the pitch: all three even, or all three odd.
-pub(super) type Site = [i32; 3];
+pub(crate) type Site = [i32; 3];
 
 /// The sites beside one, one of each two opposite ones: along the axes, where the distance is a, and across, where it is sqrt(3) / 2 a.
 const WAYS: [Site; 7] = [
@@ -36,7 +36,7 @@ const WAYS: [Site; 7] = [
 ];
 
 /// The 14 sites beside one.
-pub(super) fn beside(site: Site) -> impl Iterator<Item = Site> {
+pub(crate) fn beside(site: Site) -> impl Iterator<Item = Site> {
     WAYS.into_iter().flat_map(move |way| {
         [
             std::array::from_fn(|k| site[k] + way[k]),
@@ -46,7 +46,7 @@ pub(super) fn beside(site: Site) -> impl Iterator<Item = Site> {
 }
 
 /// The site that is nearest to a place, which is given in halves of the pitch.
-pub(super) fn nearest_site(place: [f64; 3]) -> Site {
+pub(crate) fn nearest_site(place: [f64; 3]) -> Site {
     let even = place.map(|c| 2 * (c / 2.0).round() as i32);
     let odd = place.map(|c| 2 * (c / 2.0).floor() as i32 + 1);
     let apart = |site: Site| -> f64 {
@@ -58,16 +58,42 @@ pub(super) fn nearest_site(place: [f64; 3]) -> Site {
 
 /// Values at sites, each with all sites beside it that are needed.
 #[derive(Debug, Default)]
-pub(super) struct Samples {
-    pub(super) sites: Vec<Site>,
+pub(crate) struct Samples {
+    pub(crate) sites: Vec<Site>,
     /// Of each site; the surface is where it is 0, and inside it is below. None is 0.
-    pub(super) values: Vec<f64>,
-    pub(super) index: HashMap<Site, u32>,
+    pub(crate) values: Vec<f64>,
+    pub(crate) index: HashMap<Site, u32>,
 }
 
 impl Samples {
+    /// A function at all sites of a box, from the site `low` to the site `high`; values nearer to 0 than `least` become it.
+    pub(crate) fn of_box(low: Site, high: Site, least: f64, value: impl Fn(Site) -> f64) -> Self {
+        let mut samples = Self::default();
+        let along = |axis: usize| low[axis]..=high[axis];
+        for (z, y) in along(2).flat_map(|z| along(1).map(move |y| (z, y))) {
+            for site in along(0).map(|x| [x, y, z]) {
+                let parity = site.map(|c| c.rem_euclid(2));
+                if parity == [0; 3] || parity == [1; 3] {
+                    samples.add(site, value(site), least);
+                }
+            }
+        }
+        samples
+    }
+
+    /// Adds a site that is not there yet; a value nearer to 0 than `least` becomes it.
+    pub(crate) fn add(&mut self, site: Site, value: f64, least: f64) {
+        self.index.insert(site, self.sites.len() as u32);
+        self.sites.push(site);
+        self.values.push(if value < 0.0 {
+            value.min(-least)
+        } else {
+            value.max(least)
+        });
+    }
+
     /// The surface, triangles seen from where the values are above 0. `place` is where a site is, m. Sites below 0 must have all sites beside them.
-    pub(super) fn surface(&self, place: impl Fn(Site) -> Point3<f64>) -> RawMesh {
+    pub(crate) fn surface(&self, place: impl Fn(Site) -> Point3<f64>) -> RawMesh {
         let mut surface = Surface {
             samples: self,
             place,
