@@ -19,14 +19,14 @@ impl Session {
 
     /// The same where another session begins at once: nodes, bridge and observers join that one, and it gets what is left in `kept`.
     pub(crate) fn make_way(
-        mut self,
+        self,
         terminal: &Terminal,
         kept: &mut Continuity,
     ) -> (SessionReport, Option<Failure>) {
         self.makes_way.store(true, Ordering::Relaxed);
-        let (left, before, clock) = (self.left.clone(), self.before.take(), self.clock);
+        let handover = self.handover.clone();
         let ended = self.conclude(terminal);
-        kept.handover = before.map(|before| left.hand_over(before, clock));
+        kept.handover = Some(handover);
         ended
     }
 

@@ -4,7 +4,7 @@
 //! the scene's start. The device that this process opened stays open; one behind a bridge stays by itself.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use god_object::nalgebra::Vector6;
@@ -16,33 +16,20 @@ use crate::loops::god_object::Stand;
 use crate::session::setup::{DeviceOrigin, DeviceSource, SessionSetup};
 use crate::shared::clock::{SessionClock, nanoseconds};
 
-/// What the loops leave when they end.
-#[derive(Default)]
-pub(super) struct Left {
-    stand: Mutex<Option<Stand>>,
-    device: Mutex<Option<Box<dyn Device>>>,
-}
-
-/// What of a session its next one is compared with.
-#[derive(Debug)]
-pub(super) struct Before {
-    world: Arc<World>,
-    start: Pose,
-    motions: Vec<BuiltMotion>,
-    device: DeviceOrigin,
-    /// Of a device that is of a session before.
-    ahead: Option<Ahead>,
-}
-
 /// How much the clock of a kept device is ahead of the session's, ns. Set anew for each session: a device is wrapped once, however many it serves.
 type Ahead = Arc<AtomicU64>;
 
-/// All that the next session gets.
+/// What a session was made of, and what its loops leave when they end.
 pub(crate) struct Handover {
-    before: Before,
-    stand: Option<Stand>,
-    device: Option<Box<dyn Device>>,
+    world: Arc<World>,
+    start: Pose,
+    motions: Vec<BuiltMotion>,
+    origin: DeviceOrigin,
     clock: SessionClock,
+    /// Of a device that is of a session before.
+    ahead: Option<Ahead>,
+    stand: Mutex<Option<Stand>>,
+    device: Mutex<Option<Box<dyn Device>>>,
 }
 
 /// Where the body of a session began.
@@ -68,37 +55,32 @@ impl Beginning {
     }
 }
 
-impl Left {
-    pub(super) fn leave_stand(&self, stand: Stand) {
-        *self.stand.lock().unwrap_or_else(PoisonError::into_inner) = Some(stand);
-    }
-
-    pub(super) fn leave_device(&self, device: Box<dyn Device>) {
-        *self.device.lock().unwrap_or_else(PoisonError::into_inner) = Some(device);
-    }
-
-    /// All of it, once the loops have ended.
-    pub(super) fn hand_over(&self, before: Before, clock: SessionClock) -> Handover {
-        let stand = &self.stand;
-        let device = &self.device;
-        Handover {
-            before,
-            stand: stand.lock().unwrap_or_else(PoisonError::into_inner).take(),
-            device: device.lock().unwrap_or_else(PoisonError::into_inner).take(),
-            clock,
-        }
-    }
-}
-
-impl Before {
+impl Handover {
+    /// Of a session as its scene says, before its bodies are placed.
     pub(super) fn of(setup: &SessionSetup) -> Self {
         Self {
             world: setup.world.clone(),
             start: setup.start,
             motions: setup.motions.clone(),
-            device: setup.device_origin.clone(),
+            origin: setup.device_origin.clone(),
+            clock: SessionClock::start(),
             ahead: None,
+            stand: Mutex::default(),
+            device: Mutex::default(),
         }
+    }
+
+    /// The clock of its loops.
+    pub(super) fn begins_at(&mut self, clock: SessionClock) {
+        self.clock = clock;
+    }
+
+    pub(super) fn leave_stand(&self, stand: Stand) {
+        *lock(&self.stand) = Some(stand);
+    }
+
+    pub(super) fn leave_device(&self, device: Box<dyn Device>) {
+        *lock(&self.device) = Some(device);
     }
 
     /// Whether the same body is held and begins at the same place, among obstacles that move alike.
@@ -111,14 +93,13 @@ impl Before {
             && before.mesh.triangles() == now.mesh.triangles()
             && self.motions == setup.motions
     }
-}
 
-impl Handover {
     /// Lets the bodies of `setup` begin where they were, if it is the same body and it can stand there; the time on the traces, and what came of it.
     /// A recorded session begins at the scene's start: what is computed again begins there.
     pub(super) fn place(&self, setup: &mut SessionSetup) -> (Duration, Beginning) {
-        let is_same = setup.recording.is_none() && self.before.is_of(setup);
-        let Some(stand) = self.stand.as_ref().filter(|_| is_same) else {
+        let is_same = setup.recording.is_none() && self.is_of(setup);
+        let stand = lock(&self.stand);
+        let Some(stand) = stand.as_ref().filter(|_| is_same) else {
             return (Duration::ZERO, Beginning::AtStart);
         };
         let at_start = setup.world.clone();
@@ -150,22 +131,22 @@ impl Handover {
         }
     }
 
-    /// The device of before in the place of one that was opened as that was, on the clock of now; `now` is of the session that gets it.
-    pub(super) fn device(
-        self,
-        opened: DeviceSource,
-        now: &mut Before,
-        clock: SessionClock,
-    ) -> DeviceSource {
-        match (opened, self.device) {
-            (DeviceSource::Local(_), Some(device)) if now.device == self.before.device => {
-                let (device, ahead) = kept(device, self.before.ahead, clock.since(&self.clock));
+    /// The device of before in the place of one that was opened as that was, on the clock of `now`, which is of the session that gets it.
+    pub(super) fn device(&self, opened: DeviceSource, now: &mut Self) -> DeviceSource {
+        match (opened, lock(&self.device).take()) {
+            (DeviceSource::Local(_), Some(device)) if now.origin == self.origin => {
+                let later = now.clock.since(&self.clock);
+                let (device, ahead) = kept(device, self.ahead.clone(), later);
                 now.ahead = Some(ahead);
                 DeviceSource::Local(device)
             }
             (opened, _) => opened,
         }
     }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A device for a session that began `later` than the one before, in which it was `ahead` already if it was kept then.

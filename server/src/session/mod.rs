@@ -51,7 +51,7 @@ use crate::loops::statistics::Statistics;
 use crate::report::metrics::Metrics;
 use crate::session::audit::AuditTrail;
 use crate::session::clients::ClientLedger;
-use crate::session::handover::{Before, Beginning, Left};
+use crate::session::handover::{Beginning, Handover};
 use crate::session::monitor::{MonitorFeed, NetworkCounts};
 use crate::session::observers::ObserverServices;
 use crate::session::operator::{Moment, OperatorPage};
@@ -93,9 +93,7 @@ pub struct Session {
     observers: ObserverServices,
     operator: Option<OperatorPage>,
     link: Option<ServerLink>,
-    /// What the loops leave, and what the session was.
-    left: Arc<Left>,
-    before: Option<Before>,
+    handover: Arc<Handover>,
     beginning: Beginning,
     /// Another session begins when this one ends.
     makes_way: Arc<AtomicBool>,

@@ -20,7 +20,7 @@ use crate::session::audit::AuditTrail;
 use crate::session::broadcast::{BridgeCommands, StateWriter};
 use crate::session::clients::ClientLedger;
 use crate::session::edge_sets::EdgeSets;
-use crate::session::handover::{Before, Beginning};
+use crate::session::handover::{Beginning, Handover};
 use crate::session::monitor::{
     FreshRecording, MonitorFeed, MonitorPicture, MonitorSources, Severity,
 };
@@ -65,18 +65,19 @@ impl Session {
         kept: &mut Continuity,
     ) -> Result<Self, Failure> {
         kept.switch.begin_again();
-        let mut before = Before::of(&setup);
-        let handover = kept.handover.take();
-        let (on_traces, beginning) = match &handover {
-            Some(handover) => handover.place(&mut setup),
+        let mut handover = Handover::of(&setup);
+        let before = kept.handover.take();
+        let (on_traces, beginning) = match &before {
+            Some(before) => before.place(&mut setup),
             None => (Duration::ZERO, Beginning::AtStart),
         };
         let god_object = Self::begin(&mut setup)?;
 
         // The network, whose clock is everybody's; the device may be behind it.
         let clock = SessionClock::start();
-        if let Some(handover) = handover {
-            setup.device = handover.device(setup.device, &mut before, clock);
+        handover.begins_at(clock);
+        if let Some(before) = before {
+            setup.device = before.device(setup.device, &mut handover);
         }
         let ledger = RealtimeLedger::default();
         let runtime = network_runtime(&ledger)?;
@@ -176,8 +177,7 @@ impl Session {
             observers,
             operator,
             link: Some(link),
-            left: Arc::default(),
-            before: Some(before),
+            handover: Arc::new(handover),
             beginning,
             makes_way: Arc::default(),
             runtime,

@@ -57,7 +57,7 @@ impl Session {
         realtime: &RealtimeSettings,
     ) -> Result<(), Failure> {
         let (clock, shutdown) = (self.clock, self.shutdown.clone());
-        let left = self.left.clone();
+        let handover = self.handover.clone();
         let beat = Beat {
             period: realtime.god_object_period,
             phase: realtime.phases.god_object,
@@ -76,7 +76,7 @@ impl Session {
                     god_object.tick(|| clock.now());
                     waker.wake();
                 });
-                left.leave_stand(god_object.stand());
+                handover.leave_stand(god_object.stand());
             },
         )
     }
@@ -169,7 +169,7 @@ impl Session {
             phase: realtime.phases.haptics,
         };
         let statistics = self.statistics.haptics.clone();
-        let left = self.left.clone();
+        let handover = self.handover.clone();
         self.started = clock.now();
         self.start_thread(
             "haptics",
@@ -190,7 +190,7 @@ impl Session {
                 if let Err(cause) = ticked.and(released) {
                     resume_unwind(cause);
                 }
-                left.leave_device(haptics.into_device());
+                handover.leave_device(haptics.into_device());
             },
         )
     }

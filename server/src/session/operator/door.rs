@@ -20,7 +20,7 @@ pub(crate) struct Continuity {
     /// Where the scene is changed.
     pub(crate) scenes: Arc<SceneDesk>,
     /// What the session before left to one of the same scene.
-    pub(crate) handover: Option<Handover>,
+    pub(crate) handover: Option<Arc<Handover>>,
     door: Option<Arc<OperatorDoor>>,
 }
 
