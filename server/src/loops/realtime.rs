@@ -3,7 +3,7 @@
 //! A request that is refused is written down; with [`RealtimePolicy::Enforce`] the server does not start without it.
 //! Requests that other roles need too are in `taut_bridge::realtime`; here are the server's own.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -50,9 +50,55 @@ pub struct RealtimeReport {
 
 /// What was asked of the operating system so far, and the answers. Written at the start of each thread, never in a loop.
 #[derive(Clone, Debug, Default)]
-pub struct RealtimeLedger(Arc<Mutex<RealtimeReport>>);
+pub struct RealtimeLedger(Arc<Ledger>);
+
+#[derive(Debug, Default)]
+struct Ledger {
+    pages: Mutex<Pages>,
+    answered: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Pages {
+    report: RealtimeReport,
+    /// Threads that have not asked for everything yet.
+    asking: Vec<&'static str>,
+}
 
 impl RealtimeLedger {
+    /// A thread of this `name` is going to ask: [`RealtimeLedger::answers`] waits for it.
+    pub fn expect(&self, name: &'static str) {
+        self.pages().asking.push(name);
+    }
+
+    /// The thread of this `name` has asked for all that it needs.
+    pub fn has_asked(&self, name: &'static str) {
+        let mut pages = self.pages();
+        let place = pages.asking.iter().position(|asking| *asking == name);
+        if let Some(place) = place {
+            pages.asking.swap_remove(place);
+        }
+        self.0.answered.notify_all();
+    }
+
+    /// Everything noted, once every expected thread has asked.
+    ///
+    /// # Errors
+    /// The name of one that has not within `limit`.
+    pub fn answers(&self, limit: Duration) -> Result<RealtimeReport, &'static str> {
+        let waited = (self.0.answered)
+            .wait_timeout_while(self.pages(), limit, |pages| !pages.asking.is_empty());
+        let (pages, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        match pages.asking.first() {
+            Some(name) => Err(name),
+            None => Ok(sorted(&pages.report)),
+        }
+    }
+
+    fn pages(&self) -> MutexGuard<'_, Pages> {
+        self.0.pages.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Schedules the calling thread and notes the answer under the thread's `name`; false when it was refused.
     pub fn schedule(&self, name: &str, scheduling: Scheduling) -> bool {
         match scheduling {
@@ -75,7 +121,7 @@ impl RealtimeLedger {
 
     /// Writes an answer down; whether it was granted.
     pub fn note(&self, name: &str, grant: RealtimeGrant) -> bool {
-        let mut report = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let report = &mut self.pages().report;
         match grant {
             RealtimeGrant::Granted { what } => {
                 note_once(&mut report.enforced, format!("{name}: {what}"));
@@ -90,15 +136,15 @@ impl RealtimeLedger {
 
     /// Everything noted so far, in the order of names.
     pub fn report(&self) -> RealtimeReport {
-        let mut report = self
-            .0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone();
-        report.enforced.sort();
-        report.waived.sort();
-        report
+        sorted(&self.pages().report)
     }
+}
+
+fn sorted(report: &RealtimeReport) -> RealtimeReport {
+    let mut report = report.clone();
+    report.enforced.sort();
+    report.waived.sort();
+    report
 }
 
 /// Asks for this nice value for the calling thread.
@@ -246,5 +292,24 @@ mod tests {
                 .iter()
                 .any(|line| line.contains("haptics: SCHED_FIFO priority 200"))
         );
+    }
+
+    #[test]
+    fn the_answers_are_waited_for_however_late_a_thread_asks() {
+        let ledger = RealtimeLedger::default();
+        for name in ["haptics", "coupling"] {
+            ledger.expect(name);
+        }
+        ledger.has_asked("coupling");
+        assert_eq!(ledger.answers(Duration::ZERO), Err("haptics"));
+        let late = ledger.clone();
+        let thread = std::thread::Builder::new().spawn(move || {
+            std::thread::sleep(Duration::from_millis(50));
+            late.schedule("haptics", Scheduling::Fifo(200));
+            late.has_asked("haptics");
+        });
+        let report = ledger.answers(Duration::from_secs(60)).expect("it asks");
+        assert!(report.waived.iter().any(|line| line.starts_with("haptics")));
+        assert!(thread.expect("a thread").join().is_ok());
     }
 }

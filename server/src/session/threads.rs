@@ -25,8 +25,8 @@ use super::Session;
 
 /// The coupling looks at the shared data at least this often, should nobody wake it.
 const COUPLING_TIMEOUT: Duration = Duration::from_millis(10);
-/// How long a session waits for the threads to ask the system for their scheduling.
-const SCHEDULING_TIME: Duration = Duration::from_millis(200);
+/// How long a session waits for its threads to ask the system for their scheduling: one that gets no turn for so long makes no deadline either.
+const SCHEDULING_TIME: Duration = Duration::from_secs(10);
 
 impl Session {
     pub(super) fn start_coupling(
@@ -226,11 +226,13 @@ impl Session {
         body: impl FnOnce() + Send + 'static,
     ) -> Result<(), Failure> {
         let ledger = self.ledger.clone();
+        ledger.expect(name);
         let thread = spawn(name, &self.shutdown, move || {
             ledger.schedule(name, scheduling);
             if let Some(core) = core {
                 ledger.note(name, pin_to_core(core));
             }
+            ledger.has_asked(name);
             body();
         });
         self.threads.push(thread.map_err(|error| {
@@ -241,8 +243,14 @@ impl Session {
 
     /// Waits for the answers of the system, and takes a refusal as the policy says.
     pub(super) fn enforce(&self, policy: RealtimePolicy) -> Result<(), Failure> {
-        std::thread::sleep(SCHEDULING_TIME);
-        match (policy, self.ledger.report().waived.first()) {
+        let refused = match self.ledger.answers(SCHEDULING_TIME) {
+            Ok(report) => report.waived.into_iter().next(),
+            Err(name) => Some(format!(
+                "the thread {name} did not run within {} s",
+                SCHEDULING_TIME.as_secs()
+            )),
+        };
+        match (policy, refused) {
             (RealtimePolicy::Enforce, Some(refused)) => Err(Failure::BadInput(format!(
                 "the workbench file enforces real time, but the system refused ({refused}); grant it, or set realtime.mode = \"waive\""
             ))),
