@@ -1,12 +1,13 @@
 //! What an operator's wish comes to: read, checked, and put together as the next session, on a thread of its own.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use taut_scene::{EditedKey, FinishedFile, Scene};
 
 use super::load::{Loader, Next};
 use super::recordings;
+use super::running::Running;
 use crate::commands::recording_size;
 use crate::session::Session;
 use crate::session::operator::SceneWish;
@@ -18,65 +19,40 @@ const MAX_NOT_KEPT: usize = 100;
 /// A wish, and what it is made of.
 pub(super) struct Wanted {
     pub(super) loader: Loader,
-    /// The scene that runs.
-    pub(super) scene: Scene,
-    pub(super) from: String,
-    pub(super) in_file: Arc<str>,
-    pub(super) not_kept: Vec<String>,
-    /// What can be chosen.
-    pub(super) scenes: Vec<String>,
-    /// Where recordings go.
-    pub(super) recordings: Option<PathBuf>,
-    /// Where the session is recorded that runs.
-    pub(super) recording: Option<PathBuf>,
+    pub(super) running: Arc<Running>,
     pub(super) wish: SceneWish,
 }
 
-/// What is to take the place of the scene that runs.
-pub(super) struct Change {
-    pub(super) next: Next,
-    /// For people.
-    pub(super) what: String,
-    /// The file is to have it.
-    pub(super) keep: bool,
-    /// It is the same scene: a recording begins or ends.
-    pub(super) is_recording: bool,
-}
+/// What is to take the place of the scene that runs, and what it comes to, for people.
+pub(super) type Change = (Next, String);
 
 impl Wanted {
     /// Everything that can be wrong is found here; nothing is opened and nothing written. `None`: it runs so already, and the file is to have it.
     pub(super) fn make(self) -> Result<Option<Change>, Failure> {
-        if let Some(on) = self.wish.recording {
-            return self.recorded(on).map(Some);
-        }
-        let keep = self.wish.keep;
-        let made = match &self.wish.scene {
-            Some(named) => Some(self.another(named)?),
-            None => self.same()?,
+        let made = match (self.wish.recording, &self.wish.scene) {
+            (Some(on), _) => return self.recorded(on).map(Some),
+            (None, Some(named)) => Some(self.another(named)?),
+            (None, None) => self.same()?,
         };
         let Some((mut next, what)) = made else {
             return Ok(None);
         };
-        if keep {
+        if self.wish.keep {
             next.not_kept.clear();
         }
         Session::begin(&mut next.setup)?;
-        Ok(Some(Change {
-            next,
-            what,
-            keep,
-            is_recording: false,
-        }))
+        Ok(Some((next, what)))
     }
 
     /// The scene that runs, recorded or not.
     fn recorded(&self, on: bool) -> Result<Change, Failure> {
+        let running = &*self.running;
         if self.wish.scene.is_some() || !self.wish.edits.is_empty() || self.wish.keep {
             return Err(Failure::bad_input(
                 "a recording is of the scene as it runs; change that first, or afterwards",
             ));
         }
-        let (directory, what) = match (&self.recording, on, &self.recordings) {
+        let (directory, what) = match (&running.recording, on, &running.recordings) {
             (Some(recording), true, _) => {
                 return Err(Failure::BadInput(format!(
                     "the session is recorded to {} already",
@@ -97,9 +73,7 @@ impl Wanted {
             }
         };
         let loader = self.loader.recorded_to(directory.clone());
-        let mut next = loader.change(&self.from, self.scene.clone())?;
-        next.in_file = self.in_file.clone();
-        next.not_kept = self.not_kept.clone();
+        let mut next = loader.change(running, running.scene.clone())?;
         next.goes_on = !on; // a recording begins at the scene's start
         Session::begin(&mut next.setup)?;
         let what = match directory {
@@ -109,34 +83,28 @@ impl Wanted {
             }
             None => what,
         };
-        Ok(Change {
-            next,
-            what,
-            keep: false,
-            is_recording: true,
-        })
+        Ok((next, what))
     }
 
     /// The scene that runs, with some keys set; `None` as for [`Wanted::make`].
-    fn same(&self) -> Result<Option<(Next, String)>, Failure> {
-        let (edited, keys) = self.scene.edited(&self.wish.edits)?;
-        if edited.text() == self.scene.text() {
-            if self.wish.keep && !self.not_kept.is_empty() {
+    fn same(&self) -> Result<Option<Change>, Failure> {
+        let running = &*self.running;
+        let (edited, keys) = running.scene.edited(&self.wish.edits)?;
+        if edited.text() == running.scene.text() {
+            if self.wish.keep && !running.not_kept.is_empty() {
                 return Ok(None);
             }
             return Err(Failure::bad_input("the scene has all of that already"));
         }
-        let mut next = self.loader.change(&self.from, edited)?;
-        next.in_file = self.in_file.clone();
-        next.not_kept = self.not_kept.clone();
+        let mut next = self.loader.change(running, edited)?;
         next.goes_on = true;
         let named = tell(&keys, &mut next.not_kept);
         Ok(Some((next, named)))
     }
 
     /// Another scene, or this one as its file is, with some keys set.
-    fn another(&self, named: &str) -> Result<(Next, String), Failure> {
-        let name = chosen(&self.scenes, named)?;
+    fn another(&self, named: &str) -> Result<Change, Failure> {
+        let name = chosen(&self.running.scenes, named)?;
         let read = Scene::named_or_file(name)?;
         let (edited, keys) = read.edited(&self.wish.edits)?;
         let mut next = self.loader.choose(name, Some(edited))?;

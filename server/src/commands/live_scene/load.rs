@@ -8,6 +8,7 @@ use taut_link::ClusterKey;
 use taut_scene::{Device, Scene, Workbench};
 
 use super::files::SceneWatch;
+use super::running::Running;
 use crate::cli::ServeArgs;
 use crate::commands::key;
 use crate::session::setup::SessionSetup;
@@ -102,13 +103,15 @@ impl Loader {
         Ok(next)
     }
 
-    /// The scene that runs, from where it is, changed.
-    pub(super) fn change(&self, from: &str, edited: Scene) -> Result<Next, Failure> {
+    /// The scene that runs, changed.
+    pub(super) fn change(&self, running: &Running, edited: Scene) -> Result<Next, Failure> {
         let mut workbench = load_workbench(&self.args)?;
-        from.clone_into(&mut workbench.scene);
+        workbench.scene.clone_from(&running.from);
         // The files are others only when they are read; whatever they are now, this is the scene that runs.
         let mut next = self.load_scene(workbench, Some(edited), false)?;
         next.chosen = self.chosen.clone();
+        next.in_file = running.in_file.clone();
+        next.not_kept.clone_from(&running.not_kept);
         Ok(next)
     }
 

@@ -10,31 +10,28 @@ mod files;
 mod load;
 mod pending;
 mod recordings;
+mod running;
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use taut_scene::{Scene, Workbench, shipped_scene_text};
+use taut_scene::shipped_scene_text;
 
 use self::change::{Change, Wanted, write_scene};
 use self::files::SceneWatch;
 use self::load::Loader;
 pub(super) use self::load::{Next, load_workbench, refuse_to_follow};
 use self::pending::{Pending, joined};
+use self::running::{NO_FILE, Running};
 use crate::cli::ServeArgs;
 use crate::report::terminal::Terminal;
 use crate::session::Session;
 use crate::session::audit::PageAudit;
-use crate::session::operator::{AskedScene, SceneDesk, Standing, objects_of};
-use crate::session::setup::SessionSetup;
+use crate::session::operator::{AskedScene, SceneDesk};
 use crate::session::setup::workbench::Overrides;
 use crate::shared::failure::Failure;
 
-/// Why a shipped scene is not kept.
-const NO_FILE: &str =
-    "the scene is part of the program and has no file; serve a scene file of your own";
 /// Shortest life of a session before an operator changes its scene: a flood of changes leaves time for force.
 const SHORTEST_LIFE: Duration = Duration::from_secs(1);
 
@@ -43,36 +40,6 @@ struct Taken {
     asked: AskedScene,
     what: String,
     warnings: Vec<String>,
-    is_recording: bool,
-}
-
-/// The scene that runs.
-struct Running {
-    scene: Scene,
-    /// A shipped scene's name, or its file.
-    from: String,
-    /// Text of the file, as it was when it was read or written last.
-    in_file: Arc<str>,
-    /// What was changed since.
-    not_kept: Vec<String>,
-    /// What can be chosen.
-    scenes: Vec<String>,
-    why_closed: Option<&'static str>,
-    /// Where recordings go that are begun from the page.
-    recordings: Option<PathBuf>,
-    /// Where it is recorded.
-    recording: Option<PathBuf>,
-    why_not_recorded: Option<&'static str>,
-    /// What can be changed, a JSON object.
-    objects: String,
-}
-
-impl Running {
-    /// Why the file cannot take it.
-    fn why_not_kept(&self) -> Option<&'static str> {
-        let is_shipped = shipped_scene_text(&self.from).is_some();
-        is_shipped.then_some(NO_FILE)
-    }
 }
 
 /// The scene of one `taut serve`.
@@ -80,7 +47,7 @@ pub(super) struct LiveScene {
     loader: Loader,
     desk: Arc<SceneDesk>,
     revision: u64,
-    running: Option<Running>,
+    running: Option<Arc<Running>>,
     pending: Option<Pending>,
     taken: Option<Taken>,
     files: Option<SceneWatch>,
@@ -112,56 +79,19 @@ impl LiveScene {
         self.revision += 1;
         let revision = u32::try_from(self.revision).unwrap_or(u32::MAX);
         next.setup.content.description.revision = revision;
-        let setup = &next.setup;
-        let mut scenes: Vec<String> =
-            (next.workbench.scenes().into_iter().map(str::to_owned)).collect();
-        // The scene that the workbench names stays one of them while another is chosen.
-        let named = next.chosen.as_ref().map(|chosen| &chosen.instead_of);
-        scenes.extend(named.filter(|named| !scenes.contains(named)).cloned());
-        self.loader.keep(next.chosen.take(), setup);
+        let from_start = self.loader.args.recording.is_some();
+        self.running = Some(Arc::new(Running::of(next, from_start)));
+        self.loader.keep(next.chosen.take(), &next.setup);
         if let Some(files) = next.files.take() {
             self.files = Some(files);
         }
-        self.running = Some(Running {
-            scene: setup.scene.clone(),
-            from: next.workbench.scene.clone(),
-            in_file: next.in_file.clone(),
-            not_kept: std::mem::take(&mut next.not_kept),
-            scenes,
-            why_closed: self.why_closed(&next.workbench, setup),
-            recordings: next.workbench.operator.recordings.clone(),
-            recording: setup.recording.as_ref().map(|r| r.directory.clone()),
-            why_not_recorded: recordings::why_not(
-                &next.workbench,
-                setup,
-                self.is_recorded_from_start(),
-            ),
-            objects: objects_of(setup),
-        });
         self.show();
     }
 
-    /// Shows the page what runs.
     fn show(&self) {
-        let Some(running) = &self.running else {
-            return;
-        };
-        let recording = running
-            .recording
-            .as_ref()
-            .map(|at| at.display().to_string());
-        let standing = Standing {
-            revision: self.revision,
-            name: running.scene.name(),
-            from: &running.from,
-            scenes: &running.scenes,
-            not_kept: &running.not_kept,
-            why_closed: running.why_closed,
-            why_not_kept: running.why_not_kept(),
-            recording: recording.as_deref(),
-            why_not_recorded: running.why_not_recorded,
-        };
-        self.desk.show(&standing, &running.objects);
+        if let Some(running) = &self.running {
+            running.show(&self.desk, self.revision);
+        }
     }
 
     /// The session runs: it is where its clients find it again, and whoever asked for it hears so.
@@ -172,7 +102,6 @@ impl LiveScene {
             asked,
             what,
             mut warnings,
-            is_recording,
         }) = self.taken.take()
         else {
             return;
@@ -181,7 +110,7 @@ impl LiveScene {
             warnings.push(where_it_is);
         }
         PageAudit::edited(asked.peer, self.revision, &what);
-        if is_recording {
+        if asked.wish.recording.is_some() {
             return asked.answer(Ok(format!("{what}; revision {} runs", self.revision)));
         }
         let running = self.running.as_ref();
@@ -276,13 +205,7 @@ impl LiveScene {
         }
         let wanted = Wanted {
             loader: self.loader.clone(),
-            scene: running.scene.clone(),
-            from: running.from.clone(),
-            in_file: running.in_file.clone(),
-            not_kept: running.not_kept.clone(),
-            scenes: running.scenes.clone(),
-            recordings: running.recordings.clone(),
-            recording: running.recording.clone(),
+            running: running.clone(),
             wish,
         };
         match pending::make(wanted) {
@@ -293,7 +216,7 @@ impl LiveScene {
 
     /// Gives the file what was changed without it.
     fn keep_as_it_runs(&mut self, asked: &AskedScene) -> Result<String, String> {
-        let running = self.running.as_mut().ok_or("no scene runs")?;
+        let running = Arc::make_mut(self.running.as_mut().ok_or("no scene runs")?);
         if let Some(why) = running.why_not_kept() {
             return Err(why.to_owned());
         }
@@ -334,32 +257,30 @@ impl LiveScene {
             asked.answer(kept.map_err(|why| format!("not kept: {why}")));
             return None;
         };
-        let written = made.and_then(|mut change| {
-            if change.keep {
-                self.write(&mut change.next)?;
+        let keeps = asked.wish.keep;
+        let written = made.and_then(|(mut next, what)| {
+            if keeps {
+                self.write(&mut next)?;
             }
-            Ok(change)
+            Ok((next, what))
         });
         match written {
-            Ok(change) => {
-                let does = if change.is_recording {
+            Ok((mut next, what)) => {
+                let does = if asked.wish.recording.is_some() {
                     "begins or ends a recording"
                 } else {
                     "changes the scene"
                 };
                 terminal.say(&format!(
-                    "an operator {does} ({}): the force fades, and another session begins",
-                    change.what
+                    "an operator {does} ({what}): the force fades, and another session begins"
                 ));
-                let mut next = change.next;
-                if change.keep {
+                if keeps {
                     next.in_file = next.setup.scene.text().clone();
                 }
                 self.gone.clear();
                 self.taken = Some(Taken {
                     asked,
-                    what: change.what,
-                    is_recording: change.is_recording,
+                    what,
                     warnings: next.setup.warnings.clone(),
                 });
                 Some(next)
@@ -369,25 +290,6 @@ impl LiveScene {
                 None
             }
         }
-    }
-
-    /// Whether the command line has every session recorded.
-    fn is_recorded_from_start(&self) -> bool {
-        self.loader.args.recording.is_some()
-    }
-
-    /// Why nobody changes the scene of this session.
-    fn why_closed(&self, workbench: &Workbench, setup: &SessionSetup) -> Option<&'static str> {
-        let monitor = setup.monitor.as_ref();
-        if setup.recording.is_some() && !self.is_recorded_from_start() {
-            return Some(
-                "the session is recorded, and a recording is of one scene; end the recording first",
-            );
-        }
-        if setup.recording.is_some() || monitor.is_some_and(|m| m.record.is_some()) {
-            return Some("the session is recorded, and a recording is of one scene; serve without");
-        }
-        recordings::is_opened_once(workbench).then_some(recordings::OPENED_ONCE)
     }
 
     /// Gives the file of a scene that is about to run what it runs with.
