@@ -14,7 +14,7 @@
 //! - [`EnergyObserver`]: what the coupling did to the hand.
 //! - [`console`], [`signals`]: people and the system, heard and told without waiting.
 //! - [`realtime`]: what a periodic loop asks of the operating system.
-//! - [`run`]: a bridge, from arguments to report.
+//! - [`run`]: a bridge, from arguments to report; [`verdict`]: what such a report calls a fault.
 
 mod arm_switch;
 mod bridge;
@@ -49,6 +49,7 @@ mod simulated_strings;
 #[cfg(unix)]
 pub mod spidar_uart;
 mod trace_file;
+pub mod verdict;
 mod vrpn;
 #[cfg(unix)]
 pub mod wooden;

@@ -6,6 +6,8 @@ use std::time::Duration;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
+use crate::verdict::{said_of_misses, said_of_safety_events, verdict};
+
 /// A histogram of durations from 1 us to 60 s with three digits. Recording does not allocate.
 pub(crate) struct Durations(Histogram<u64>);
 
@@ -118,49 +120,38 @@ pub struct BridgeReport {
     pub realtime: Vec<String>,
 }
 
-/// Share of missed periods from which the verdict names them: a hand feels one late tick in a thousand as nothing.
-const NOTABLE_MISSES: f64 = 1e-3;
-
 impl BridgeReport {
     /// In one line: whether the device was served as it should be, or what was not.
     #[must_use]
     pub fn verdict(&self) -> String {
-        let missed = self.missed_periods as f64 / (self.ticks + self.missed_periods).max(1) as f64;
-        let faults: Vec<String> = [
-            (self.ticks == 0, "the device loop never ran".to_owned()),
-            (
-                missed > NOTABLE_MISSES,
-                format!(
-                    "the device loop missed {:.1} % of its periods (`taut doctor` says what the machine lacks)",
-                    100.0 * missed
-                ),
+        let said = |is_fault: bool, what: String| is_fault.then_some(what);
+        let faults = [
+            said(self.ticks == 0, "the device loop never ran".to_owned()),
+            said_of_misses(
+                ["the device loop", "periods"],
+                self.ticks,
+                self.missed_periods,
             ),
-            (
+            said(
                 self.faulty_ticks > 0,
                 format!("the device had no pose on {} ticks", self.faulty_ticks),
             ),
-            (
+            said(
                 self.broken_sets > 0,
                 format!("{} constraint sets made no sense", self.broken_sets),
             ),
-            (
+            said(
                 self.sessions > 1,
-                format!("the server was lost or stopped {} times", self.sessions - 1),
+                format!(
+                    "the server was lost or stopped {} times",
+                    self.sessions.saturating_sub(1)
+                ),
             ),
-            (
-                self.safety_events > 0,
-                format!("{} safety events (in the log)", self.safety_events),
-            ),
-        ]
-        .into_iter()
-        .filter_map(|(is_fault, what)| is_fault.then_some(what))
-        .collect();
-        if faults.is_empty() {
-            "verdict: good, periods kept, device and server always there, no safety event"
-                .to_owned()
-        } else {
-            format!("verdict: look at this: {}", faults.join("; "))
-        }
+            said_of_safety_events(self.safety_events),
+        ];
+        let faults: Vec<String> = faults.into_iter().flatten().collect();
+        let good = "good, periods kept, device and server always there, no safety event";
+        format!("verdict: {}", verdict(good, &faults))
     }
 }
 

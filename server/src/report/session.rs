@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use taut_bridge::verdict::{said_of_misses, said_of_safety_events, verdict};
 use taut_link::Distribution;
 
 use crate::loops::fidelity::FidelityReport;
@@ -91,9 +92,6 @@ pub struct SessionReport {
     pub fidelity: Option<FidelityReport>,
 }
 
-/// Share of missed deadlines from which the verdict names them: a hand feels one late tick in a thousand as nothing.
-const NOTABLE_MISSES: f64 = 1e-3;
-
 impl SessionReport {
     /// In one line: whether the session was as it should be, or what was not.
     pub fn verdict(&self) -> String {
@@ -105,14 +103,11 @@ impl SessionReport {
             ));
         }
         faults.extend(said_of_stops(self.stops_without_force));
-        let ticks = self.haptics_period_us.count + self.deadline_misses;
-        let missed = self.deadline_misses as f64 / ticks.max(1) as f64;
-        if missed > NOTABLE_MISSES {
-            faults.push(format!(
-                "the haptics loop missed {:.1} % of its deadlines (`taut doctor` says what the machine lacks)",
-                100.0 * missed
-            ));
-        }
+        faults.extend(said_of_misses(
+            ["the haptics loop", "deadlines"],
+            self.haptics_period_us.count,
+            self.deadline_misses,
+        ));
         for client in &self.clients {
             if client.free_running {
                 faults.push(format!("{} draws fewer frames than it should", client.node));
@@ -124,14 +119,9 @@ impl SessionReport {
                 ));
             }
         }
-        if self.safety_events > 0 {
-            faults.push(format!("{} safety events (in the log)", self.safety_events));
-        }
-        if faults.is_empty() {
-            "verdict             good: deadlines kept, no penetration, no safety event".to_owned()
-        } else {
-            format!("verdict             look at this: {}", faults.join("; "))
-        }
+        faults.extend(said_of_safety_events(self.safety_events));
+        let good = "good: deadlines kept, no penetration, no safety event";
+        format!("verdict             {}", verdict(good, &faults))
     }
 
     /// The periods of the haptics loop as a histogram, one line per bin that is not empty.
