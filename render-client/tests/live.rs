@@ -208,6 +208,14 @@ impl Server {
         self.folder.path().join("pictures")
     }
 
+    /// One that a node has written there.
+    pub fn picture(&self, file: &str) -> image::RgbaImage {
+        let picture = image::open(self.pictures().join(file));
+        picture
+            .unwrap_or_else(|error| panic!("{file}: {error}"))
+            .to_rgba8()
+    }
+
     pub fn stop(mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(sender) = self.sender.take() {

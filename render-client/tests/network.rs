@@ -5,11 +5,32 @@ use crate::live::{Server, can_draw, content, start, wait_for};
 
 use std::sync::atomic::Ordering;
 
+use image::RgbaImage;
+use taut_link::Content;
 use taut_proto::barrier::{MasterSettings, Swap};
 use taut_proto::{Finish, Look, Looks, MeshHash, Panorama, Texture, TextureUse, Textures, Wrap};
 use taut_render::RenderError;
 use taut_render::cli::{RenderArgs, TransportArg};
 use taut_render::statistics::Ended;
+
+/// What the table shows of this content in the first frame.
+fn drawn(content: Content) -> RgbaImage {
+    let server = Server::serving(None, content);
+    let mut args = server.args("both");
+    (args.frames, args.out) = (Some(1), Some(server.pictures()));
+    taut_render::run(args).expect("draws");
+    let picture = server.picture("both-table-00001.png");
+    server.stop();
+    picture
+}
+
+fn count(picture: &RgbaImage, kind: impl Fn([u8; 4]) -> bool) -> usize {
+    picture.pixels().filter(|pixel| kind(pixel.0)).count()
+}
+
+fn is_orange([red, _, blue, _]: [u8; 4]) -> bool {
+    red > 90 && red / 2 > blue
+}
 
 #[test]
 fn a_node_draws_what_it_is_told_over_either_transport_and_reports_it() {
@@ -37,20 +58,12 @@ fn a_node_draws_what_it_is_told_over_either_transport_and_reports_it() {
 
         for screen in ["wall", "table"] {
             for frame in 1..=5 {
-                let path = server
-                    .pictures()
-                    .join(format!("both-{screen}-{frame:05}.png"));
-                let picture = image::open(&path).expect("a picture").to_rgba8();
+                let picture = server.picture(&format!("both-{screen}-{frame:05}.png"));
                 assert_eq!(picture.dimensions(), (120, 80));
             }
         }
         // The peg points at the viewer: orange on the table's screen.
-        let path = server.pictures().join("both-table-00005.png");
-        let picture = image::open(path).expect("a picture").to_rgba8();
-        let orange = picture
-            .pixels()
-            .filter(|p| p.0[0] > 90 && p.0[0] / 2 > p.0[2])
-            .count();
+        let orange = count(&server.picture("both-table-00005.png"), is_orange);
         assert!(orange > 30, "{orange} orange pixels");
         server.stop();
     }
@@ -66,14 +79,8 @@ fn a_node_draws_in_the_light_that_the_server_names() {
         let hash = |light: &Panorama| MeshHash::of(&light.encode());
         content.description.environment = light.as_ref().map(hash);
         content.panorama = light;
-        let server = Server::serving(None, content);
-        let mut args = server.args("both");
-        (args.frames, args.out) = (Some(1), Some(server.pictures()));
-        taut_render::run(args).expect("draws");
-        let path = server.pictures().join("both-table-00001.png");
-        let picture = image::open(path).expect("a picture").to_rgba8();
+        let picture = drawn(content);
         let sum = |part: usize| -> f64 { picture.pixels().map(|p| f64::from(p.0[part])).sum() };
-        server.stop();
         sum(0) / sum(2)
     };
     let (studio, red) = (
@@ -115,16 +122,9 @@ fn a_node_draws_the_textures_that_the_server_sends() {
     content.description.god_object.mesh = MeshHash::of(&mesh.encode().expect("small"));
     content.meshes[0] = mesh;
     content.textures = vec![std::sync::Arc::new(green)];
-    let server = Server::serving(None, content);
-    let mut args = server.args("both");
-    (args.frames, args.out) = (Some(1), Some(server.pictures()));
-    taut_render::run(args).expect("draws");
-    let path = server.pictures().join("both-table-00001.png");
-    let picture = image::open(path).expect("a picture").to_rgba8();
-    let count = |kind: &dyn Fn(&[u8; 4]) -> bool| picture.pixels().filter(|p| kind(&p.0)).count();
-    let green = count(&|p| p[1] > 60 && p[1] / 2 > p[0].max(p[2]));
-    let orange = count(&|p| p[0] > 90 && p[0] / 2 > p[2]);
-    server.stop();
+    let picture = drawn(content);
+    let green = count(&picture, |p| p[1] > 60 && p[1] / 2 > p[0].max(p[2]));
+    let orange = count(&picture, is_orange);
     assert!(green > 30 && orange == 0, "{green} green, {orange} orange");
 }
 
@@ -264,8 +264,7 @@ fn a_node_with_two_screens_shows_one_instant_on_both_with_a_barrier_and_without(
         for frame in 1..=12 {
             let [table, again] = ["table", "again"].map(|screen| {
                 let file = format!("twice-{screen}-{frame:05}.png");
-                let path = server.pictures().join(file);
-                image::open(path).expect("a picture").to_rgba8().into_raw()
+                server.picture(&file).into_raw()
             });
             assert!(table == again, "frame {frame}");
             distinct.insert(table);
