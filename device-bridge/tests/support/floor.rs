@@ -1,11 +1,10 @@
-//! A floor under a device, felt through its port: in real time, or under a virtual clock; and damage that is the same each time.
+//! A floor under a device, felt through its port, beside a device that runs by itself or step by step with it; and damage that is the same each time.
 
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector6};
-use taut_bridge::realtime::monotonic_now;
 use taut_bridge::{
     ArmPort, ArmState, Command, CommandSource, Device, DeviceFault, DevicePort, Placement, Pose,
     SafetySettings,
@@ -58,11 +57,13 @@ impl OnFloor {
         (report.reading.fault, report.wrench.norm())
     }
 
-    /// Ticks in real time until `done` of fault and force.
+    /// Ticks until `done` of fault and force, with pauses of a millisecond, which is what the virtual clock counts, however long they take: a port that a busy
+    /// machine lets stand for 20 ms time and again would find the device lost each time, and never arm.
     pub fn until(&mut self, what: &str, done: impl Fn(Option<DeviceFault>, f64) -> bool) {
         let begun = Instant::now();
         loop {
-            let (fault, force) = self.tick(monotonic_now());
+            self.time += 1;
+            let (fault, force) = self.tick(ms(self.time));
             if done(fault, force) {
                 return;
             }
