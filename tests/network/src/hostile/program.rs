@@ -64,8 +64,9 @@ pub(super) const ATTACKS: &[Attack] = &[
 
 /// A force at the arm that is one, N.
 const FELT: f64 = 0.5;
-/// How far down the hand goes, m.
+/// How far down the hand goes, m, and in what time, s.
 const DEEP: f64 = -0.06;
+const DOWN_S: f64 = 2.0;
 /// Above the loops, where the system grants real time.
 const BOARD_PRIORITY: u8 = 85;
 /// Below them.
@@ -120,7 +121,7 @@ impl Pressing {
             time_s,
             pose: Pose::translation(0.0, 0.0, z),
         };
-        let path = vec![via(0.0, 0.0), via(4.0, DEEP)];
+        let path = vec![via(0.0, 0.0), via(DOWN_S, DEEP)];
         let path = MinJerkPath::new(path, false).map_err(missing)?;
         let arm = SimulatedWooden::new(WOODEN_MODELS[0], Hand::FIRM, Some(path), None).waiting();
         let socket = workbench.path("board");
