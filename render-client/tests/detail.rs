@@ -86,12 +86,12 @@ fn meshes() -> Vec<(&'static str, TriangleMesh)> {
         bits ^= bits << 5;
         bits as f32 / u32::MAX as f32 - 0.5
     };
-    let mut scan = shapes::sphere(0.03, 400);
+    let mut scan = shapes::sphere(0.03, 200);
     for vertex in &mut scan.vertices {
         *vertex = vertex.map(|x| x + 3e-5 * noise());
     }
     vec![
-        ("sphere", shapes::sphere(0.03, 412)),
+        ("sphere", shapes::sphere(0.03, 206)),
         ("waves", wavy(8.0, 0.05)),
         ("ripples", wavy(40.0, 0.004)),
         ("scan", scan),
@@ -105,7 +105,7 @@ fn meshes() -> Vec<(&'static str, TriangleMesh)> {
         ),
         (
             "two sizes",
-            beside(shapes::sphere(0.03, 300), shapes::sphere(0.001, 160), 0.05),
+            beside(shapes::sphere(0.03, 150), shapes::sphere(0.001, 80), 0.05),
         ),
     ]
 }
