@@ -364,9 +364,9 @@ fn no_contact_of_the_bunnies_is_late_or_far_early() {
         let expected = n[13];
         let motion = straight(start, displacement);
         let found = time_of_impact(
-            bunny,
+            &*bunny,
             &motion,
-            bunny,
+            &*bunny,
             &Pose::identity(),
             &settings,
             &mut CollisionWorkspace::new(),

@@ -1,7 +1,7 @@
 //! Contacts of primitives: closed forms, and the nearest one against parry's distance.
 
 use crate::shape_support::{Form, forms, obstacles, oracle_distance, turned, vectors};
-use god_object::collision::{CollisionWorkspace, Work};
+use god_object::collision::{CollisionWorkspace, Work, shapes_intersect, surfaces_intersect};
 use god_object::constraint::{Contact, Feature};
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::shape;
@@ -319,7 +319,7 @@ proptest! {
         let start = pose * Pose::new(offset, turn);
         let distance = oracle_distance(&form.oracle(), &start, &obstacle.oracle(), &pose);
         prop_assume!(distance > 1e-5 && distance < 0.02);
-        prop_assume!(!shape::shapes_intersect(&form.body(), &start, &obstacle.obstacle("o", pose), &pose));
+        prop_assume!(!shapes_intersect(&form.body(), &start, &obstacle.obstacle("o", pose), &pose));
         let swap = swap && !matches!(obstacle, Form::Plane);
         let found = if swap {
             contacts(obstacle, &pose, form, &start, 0.021)
@@ -343,14 +343,14 @@ fn zero_motion_is_free_of_contacts_that_are_apart() {
     let down = Vector6::new(0.0, 0.0, -0.99e-4, 0.0, 0.0, 0.0);
     let moved = god_object::spatial::advance_pose(&pose, &down, 1.0);
     let plane = Form::Plane.obstacle("plane", Pose::identity());
-    assert!(!shape::shapes_intersect(
+    assert!(!shapes_intersect(
         &peg.body(),
         &moved,
         &plane,
         &Pose::identity()
     ));
     let deeper = god_object::spatial::advance_pose(&pose, &(down * 1.02), 1.0);
-    assert!(shape::shapes_intersect(
+    assert!(shapes_intersect(
         &peg.body(),
         &deeper,
         &plane,
@@ -365,8 +365,10 @@ fn a_body_inside_an_obstacle_shares_its_inside_and_not_its_surface() {
     let identity = Pose::identity();
     for (x, surfaces, shared) in [(0.0, false, true), (0.1, true, true), (0.2, false, false)] {
         let pose = Pose::translation(x, 0.0, 0.0);
-        let found = [shape::shape_surfaces_intersect, shape::shapes_intersect]
-            .map(|intersect| intersect(&body, &pose, &obstacle, &identity));
+        let found = [
+            surfaces_intersect(&body, &pose, &obstacle, &identity),
+            shapes_intersect(&body, &pose, &obstacle, &identity),
+        ];
         assert_eq!(found, [surfaces, shared], "{x}");
     }
 }

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use crate::shape_support::{Form, turned};
 use assert_no_alloc::assert_no_alloc;
+use god_object::collision::shapes_intersect;
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
-use god_object::{ConstraintSet, Coupling, GodObject, Pose, Settings, StartError, World, shape};
+use god_object::{ConstraintSet, Coupling, GodObject, Pose, Settings, StartError, World};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::f64::consts::FRAC_PI_2;
@@ -55,7 +56,7 @@ impl Loops {
         self.world
             .obstacles
             .iter()
-            .all(|o| !shape::shapes_intersect(&self.world.body, self.god_object.pose(), o, &o.pose))
+            .all(|o| !shapes_intersect(&self.world.body, self.god_object.pose(), o, &o.pose))
     }
 }
 

@@ -3,9 +3,11 @@
 use crate::shape_support;
 
 use crate::shape_support::{Form, forms, obstacles, oracle_distance, vectors};
-use god_object::collision::{AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work};
+use god_object::collision::{
+    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, shapes_intersect,
+    time_of_impact,
+};
 use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
-use god_object::shape;
 use god_object::spatial::six;
 use god_object::{Pose, Vector6};
 use proptest::prelude::*;
@@ -34,7 +36,7 @@ fn search(
         displacement: *displacement,
         reference_point: Point3::origin(),
     };
-    shape::time_of_impact(
+    time_of_impact(
         &form.body(),
         &motion,
         &obstacle.obstacle("obstacle", *pose),
@@ -65,7 +67,7 @@ proptest! {
         let distance = |pose_a: &Pose| oracle_distance(&a, pose_a, &b, &pose);
         prop_assume!(distance(&start) > 2e-4);
         // The surface of a mesh has no inside for the oracle.
-        prop_assume!(!shape::shapes_intersect(&form.body(), &start, &obstacle.obstacle("o", pose), &pose));
+        prop_assume!(!shapes_intersect(&form.body(), &start, &obstacle.obstacle("o", pose), &pose));
         let displacement = six(&path, &spin);
         let motion = Motion { start, displacement, reference_point: Point3::origin() };
         let found = search(form, &start, &displacement, obstacle, &pose);
@@ -104,7 +106,7 @@ fn what_is_out_of_reach_costs_nothing() {
     };
     for (form, obstacle) in pairs {
         let mut work = Work::default();
-        let found = shape::time_of_impact(
+        let found = time_of_impact(
             &form.body(),
             &motion,
             &obstacle.obstacle("obstacle", Pose::identity()),

@@ -5,7 +5,8 @@
 
 use std::path::Path;
 
-use god_object::{Pose, Vector6, shape};
+use god_object::collision::shapes_intersect;
+use god_object::{Pose, Vector6};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use taut_method_tests::hand::Random;
 use taut_method_tests::motion::Led;
@@ -128,7 +129,7 @@ fn landing(built: &BuiltScene, random: &mut Random) -> [Pose; 2] {
     let at = |z: f64| Pose::from_parts(Vector3::new(x, y, z).into(), rotation);
     let obstacle = &built.world.obstacles[0];
     let meet =
-        |z: f64| shape::shapes_intersect(&built.world.body, &at(z), obstacle, &obstacle.pose);
+        |z: f64| shapes_intersect(&built.world.body, &at(z), obstacle, &obstacle.pose);
     let (mut high, mut low) = (0.08, 0.0);
     while high - low > 1e-6 {
         let middle = 0.5 * (high + low);

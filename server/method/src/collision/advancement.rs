@@ -1,10 +1,11 @@
-//! Conservative advancement of one triangle of a moving body towards one triangle of an obstacle.
+//! Conservative advancement of one convex piece of a moving body towards one piece of an obstacle: triangles, segments and points, with balls swept over
+//! them. What cylinders and half-spaces do otherwise: [`discs`](super::discs).
 //!
 //! | symbol | name in code | unit | meaning                                                                   |
 //! |--------|--------------|------|---------------------------------------------------------------------------|
-//! | n      | `direction`  | –    | unit direction from the obstacle's triangle to the body's                 |
-//! | x_i    |              | m    | corners of the body's triangle at `time`; velocity v_i, acceleration a_i  |
-//! | s      | `support`    | m    | `max_j n.y_j` over the corners of the obstacle's triangle                 |
+//! | n      | `direction`  | –    | unit direction from the obstacle's piece to the body's                    |
+//! | x_i    |              | m    | corners of the body's piece at `time`; velocity v_i, acceleration a_i     |
+//! | s      | `support`    | m    | `max_j n.y_j` over the corners of the obstacle's piece, and the balls' radii |
 //! | g_i    |              | m    | `n.x_i - s - stop_gap`                                                    |
 //! | h      |              | –    | step in time                                                              |
 //!
@@ -17,6 +18,8 @@
 use arrayvec::ArrayVec;
 use nalgebra::{Point3, Vector3};
 
+use super::collider::Swept;
+use super::discs::SweptPair;
 use super::fall::time_to_fall;
 use super::gaps::Gaps;
 use super::motion::{Placement, RelativeMotion};
@@ -28,7 +31,7 @@ const LAST_SHARE: f64 = 0.5;
 /// Directions kept to be tried on neighbours of a pair that was followed.
 const MAX_DIRECTIONS: usize = 4;
 
-/// What a pair of triangles does in an interval.
+/// What a pair of pieces does in an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum PairOutcome {
     /// They stay apart.
@@ -43,20 +46,22 @@ pub(super) enum PairOutcome {
     Overlap,
 }
 
-/// A search for the first impact between triangles of one body and one obstacle.
+/// A search for the first impact between pieces of one body and one obstacle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PairSearch<'a> {
     pub(super) motion: &'a RelativeMotion,
     pub(super) gaps: Gaps,
+    pub(super) swept: Swept,
     pub(super) max_iterations: u32,
     /// `|w|^3 R / 6`, R the radius of the body about G, m: no corner's path bends by more in the cube of time.
     pub(super) cubic: f64,
 }
 
-/// The two triangles of a pair: the body's in the body frame, the obstacle's in its own.
+/// The two pieces of a pair: the body's in the body frame, the obstacle's in its own. A corner that is not used repeats the last.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct TrianglePair {
+pub(super) struct PiecePair {
     pub(super) on_body: [Point3<f64>; 3],
+    /// NaN without one.
     pub(super) body_normal: Vector3<f64>,
     pub(super) on_obstacle: [Point3<f64>; 3],
     pub(super) obstacle_normal: Vector3<f64>,
@@ -69,11 +74,16 @@ impl PairSearch<'_> {
     #[inline]
     pub(super) fn is_free(
         &self,
-        pair: &TrianglePair,
+        pair: &PiecePair,
         placement: &Placement,
         [start, from, to]: [f64; 3],
         lately: &Directions,
     ) -> bool {
+        if !self.swept.has_only_balls() {
+            let moving = MovingPiece::at(self.motion, placement, &pair.on_body, to - start);
+            let swept = SweptPair::new(self, pair, &moving, placement, to - start);
+            return swept.step_along_faces().step >= to - start;
+        }
         let path = Path::new(self, pair, placement, [from - start, to - start]);
         path.is_free_along(&pair.obstacle_normal, pair)
             || path.is_free_along(&-(placement.rotation * pair.body_normal), pair)
@@ -83,7 +93,7 @@ impl PairSearch<'_> {
     /// Follows the pair over `[from, to]`.
     pub(super) fn follow(
         &self,
-        pair: &TrianglePair,
+        pair: &PiecePair,
         placement: &Placement,
         [from, to]: [f64; 2],
         lately: &mut Directions,
@@ -91,10 +101,10 @@ impl PairSearch<'_> {
     ) -> PairOutcome {
         let mut time = from;
         let mut placement = *placement;
-        let mut moving = MovingTriangle::at(self.motion, &placement, &pair.on_body, to - from);
+        let mut moving = MovingPiece::at(self.motion, &placement, &pair.on_body, to - from);
         for iteration in 0..self.max_iterations {
             work.advancement_steps += 1;
-            let best = moving.best_step(pair, &placement, self.gaps.stop, to - time);
+            let best = self.best_step(&moving, pair, &placement, to - time);
             lately.add(&best.direction);
             let far = best.gap >= self.gaps.stop; // false for NaN
             if iteration == 0 && !far {
@@ -111,19 +121,48 @@ impl PairSearch<'_> {
             }
             time += best.step.max(0.0);
             placement = self.motion.at(time);
-            moving = MovingTriangle::at(self.motion, &placement, &pair.on_body, to - time);
+            moving = MovingPiece::at(self.motion, &placement, &pair.on_body, to - time);
         }
         PairOutcome::Limit(time)
     }
 
+    fn best_step(
+        &self,
+        moving: &MovingPiece,
+        pair: &PiecePair,
+        placement: &Placement,
+        wanted: f64,
+    ) -> SafeStep {
+        if self.swept.has_only_balls() {
+            moving.best_step(pair, placement, self, wanted)
+        } else {
+            SweptPair::new(self, pair, moving, placement, wanted).best_step(wanted)
+        }
+    }
+
     /// A pair that is nearer than the gap to stop at: along no direction is there more than `gap`.
-    fn near(&self, moving: &MovingTriangle, pair: &TrianglePair, gap: f64) -> PairOutcome {
+    fn near(&self, moving: &MovingPiece, pair: &PiecePair, gap: f64) -> PairOutcome {
         let apart = gap > self.gaps.slack; // false for NaN
-        if !apart && triangles_intersect(&moving.corners, &pair.on_obstacle) {
+        let overlap = if self.swept.nothing {
+            !apart && triangles_intersect(&moving.corners, &pair.on_obstacle)
+        } else {
+            gap < -self.gaps.slack
+        };
+        if overlap {
             PairOutcome::Overlap
         } else {
             PairOutcome::Near(gap)
         }
+    }
+
+    /// Whether the pieces are not proved apart, with the body there: to rounding for triangles, in which they are no solids.
+    pub(super) fn meets(&self, pair: &PiecePair, placement: &Placement) -> bool {
+        let moving = MovingPiece::at(self.motion, placement, &pair.on_body, 0.0);
+        if self.swept.nothing {
+            return triangles_intersect(&moving.corners, &pair.on_obstacle);
+        }
+        let apart = self.best_step(&moving, pair, placement, f64::INFINITY).gap > 0.0; // false for NaN
+        !apart
     }
 }
 
@@ -145,7 +184,7 @@ impl Directions {
     }
 }
 
-/// The corners of a triangle of the body, obstacle frame, over an interval.
+/// The corners of a piece of the body, obstacle frame, over an interval.
 struct Path<'a> {
     motion: &'a RelativeMotion,
     corners: [Vector3<f64>; 3],
@@ -161,7 +200,7 @@ impl<'a> Path<'a> {
     #[inline(always)]
     fn new(
         search: &PairSearch<'a>,
-        pair: &TrianglePair,
+        pair: &PiecePair,
         placement: &Placement,
         part: [f64; 2],
     ) -> Self {
@@ -175,16 +214,15 @@ impl<'a> Path<'a> {
             corners,
             part,
             cubic: search.cubic * part[1],
-            kept: search.gaps.stop,
+            kept: search.gaps.stop + search.swept.round,
         }
     }
 
     /// Along a direction each corner stays above `height + speed h - max(bend, 0) h^2`, which is concave in h: above the
     /// gap at both ends, it is so in between. No roots; the cubic term is that of the whole body. False for NaN.
     #[inline(always)]
-    fn is_free_along(&self, n: &Vector3<f64>, pair: &TrianglePair) -> bool {
-        let [p, q, r] = &pair.on_obstacle;
-        let support = n.dot(&p.coords).max(n.dot(&q.coords)).max(n.dot(&r.coords));
+    fn is_free_along(&self, n: &Vector3<f64>, pair: &PiecePair) -> bool {
+        let support = support(n, &pair.on_obstacle);
         if !support.is_finite() {
             return false;
         }
@@ -207,16 +245,42 @@ impl<'a> Path<'a> {
 
 /// A step in time that is safe along some direction, and the gap along it.
 #[derive(Clone, Copy, Debug)]
-struct SafeStep {
-    step: f64,
-    gap: f64,
-    direction: Vector3<f64>,
+pub(super) struct SafeStep {
+    pub(super) step: f64,
+    pub(super) gap: f64,
+    pub(super) direction: Vector3<f64>,
 }
 
-/// A triangle of the body at one time, obstacle frame, with what bounds its path from there.
+impl SafeStep {
+    /// Where nothing is known along `direction`.
+    pub(super) fn nowhere(direction: &Vector3<f64>) -> Self {
+        Self {
+            step: 0.0,
+            gap: f64::NEG_INFINITY,
+            direction: *direction,
+        }
+    }
+
+    /// The longer step and the larger gap; `max` prefers any number to NaN.
+    pub(super) fn or(self, other: Self) -> Self {
+        Self {
+            step: self.step.max(other.step),
+            gap: self.gap.max(other.gap),
+            ..self
+        }
+    }
+}
+
+/// The largest `n.y` over the corners of a piece, m.
+#[inline(always)]
+pub(super) fn support(n: &Vector3<f64>, [p, q, r]: &[Point3<f64>; 3]) -> f64 {
+    n.dot(&p.coords).max(n.dot(&q.coords)).max(n.dot(&r.coords))
+}
+
+/// A piece of the body at one time, obstacle frame, with what bounds its path from there.
 #[derive(Clone, Copy, Debug)]
-struct MovingTriangle {
-    corners: [Point3<f64>; 3],
+pub(super) struct MovingPiece {
+    pub(super) corners: [Point3<f64>; 3],
     velocities: [Vector3<f64>; 3],
     /// Half of the accelerations.
     bends: [Vector3<f64>; 3],
@@ -225,7 +289,7 @@ struct MovingTriangle {
     spin: Vector3<f64>,
 }
 
-impl MovingTriangle {
+impl MovingPiece {
     #[inline]
     fn at(
         motion: &RelativeMotion,
@@ -257,63 +321,62 @@ impl MovingTriangle {
     /// direction; the normals are not asked where the closest points allow all that is `wanted`.
     fn best_step(
         &self,
-        pair: &TrianglePair,
+        pair: &PiecePair,
         placement: &Placement,
-        gap_to_keep: f64,
+        search: &PairSearch,
         wanted: f64,
     ) -> SafeStep {
+        let gap_to_keep = search.gaps.stop;
         let closest = closest_on_triangles(&self.corners, &pair.on_obstacle);
         let along_points = (closest.on_first - closest.on_second) / closest.squared_distance.sqrt(); // NaN where they touch
-        let along = |n: &Vector3<f64>| self.safe_step(n, &pair.on_obstacle, gap_to_keep);
+        let along = |n: &Vector3<f64>| {
+            let below = support(n, &pair.on_obstacle) + search.swept.round;
+            self.safe_step(n, below, gap_to_keep)
+        };
         let mut best = along(&along_points);
         // `max` prefers any number to NaN.
         best.step = best.step.max(0.0);
         if best.step >= wanted && best.gap >= gap_to_keep {
             return best;
         }
-        for n in [
-            pair.obstacle_normal,
-            -(placement.rotation * pair.body_normal),
-        ] {
-            let other = along(&n);
-            best.step = best.step.max(other.step);
-            best.gap = best.gap.max(other.gap);
-        }
-        best
+        best.or(along(&pair.obstacle_normal))
+            .or(along(&-(placement.rotation * pair.body_normal)))
     }
 
-    /// How far in time the triangle may move so that it stays `gap_to_keep` off the other along `direction`. NaN goes nowhere.
+    /// How far in time the piece may move so that it stays `gap_to_keep` above `below` along `direction`. NaN goes nowhere.
     #[inline]
-    fn safe_step(
+    pub(super) fn safe_step(
         &self,
         direction: &Vector3<f64>,
-        other: &[Point3<f64>; 3],
+        below: f64,
         gap_to_keep: f64,
     ) -> SafeStep {
-        let [p, q, r] = other;
-        let support = direction
-            .dot(&p.coords)
-            .max(direction.dot(&q.coords))
-            .max(direction.dot(&r.coords));
         let sideways = direction.cross(&self.spin).norm();
         let mut step = f64::INFINITY;
         let mut gap = f64::INFINITY;
-        for i in 0..3 {
-            let height = direction.dot(&self.corners[i].coords) - support;
+        for corner in 0..3 {
+            let (along, speed, bend) = self.path(corner, direction, sideways);
+            let height = along - below;
             gap = gap.min(height);
-            let bend = self.remainders[i] * sideways - direction.dot(&self.bends[i]);
-            let until = time_to_fall(
-                height - gap_to_keep,
-                direction.dot(&self.velocities[i]),
-                bend,
-            );
-            step = step.min(until);
+            step = step.min(time_to_fall(height - gap_to_keep, speed, bend));
         }
-        let known = support.is_finite();
+        if !below.is_finite() {
+            return SafeStep::nowhere(direction);
+        }
         SafeStep {
-            step: if known { step } else { 0.0 },
-            gap: if known { gap } else { f64::NEG_INFINITY },
+            step,
+            gap,
             direction: *direction,
         }
+    }
+
+    /// Where a corner is along a direction, its speed, and the coefficient by which it may bend down.
+    #[inline]
+    pub(super) fn path(&self, corner: usize, n: &Vector3<f64>, sideways: f64) -> (f64, f64, f64) {
+        (
+            n.dot(&self.corners[corner].coords),
+            n.dot(&self.velocities[corner]),
+            self.remainders[corner] * sideways - n.dot(&self.bends[corner]),
+        )
     }
 }

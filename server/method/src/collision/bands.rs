@@ -11,7 +11,8 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::descent::{Opened, open};
+use super::beyond::Beyond;
+use super::descent::{AtRest, Opened, open};
 use super::facing_volumes::FacingVolumes;
 use super::turned::TurnedNodes;
 use super::work::Work;
@@ -144,7 +145,7 @@ pub(crate) fn for_nearest_triangle_pairs(
 /// In which band each pair of volumes is that was opened; [`OUT_OF_QUESTION`] leaves a pair out. No closure: it is to be compiled with the vectors of the
 /// search that it is part of.
 pub(super) trait Order {
-    fn bands(&mut self, opened: &Opened) -> [u32; LANES];
+    fn bands(&mut self, opened: &Opened<Beyond>) -> [u32; LANES];
 }
 
 /// A search that visits pairs of triangles in the order of their bands. The answer is the band in which it ended because `visit` returned false or there was no room.
@@ -201,10 +202,10 @@ where
                 continue;
             }
             work.node_pairs += 1;
-            let opened = open(trees, volumes, turned, (a, b));
+            let opened = open(&AtRest, trees, volumes, turned, (a, b));
             let own = order.bands(&opened);
-            opened.for_each(|pair, lane| {
-                let own = own[lane] as usize;
+            opened.for_each(opened.found.near, |pair, lane| {
+                let own = own[lane as usize % LANES] as usize;
                 if own < SIGNED_BANDS {
                     room &= bands.push(own.max(band), pair);
                 }
@@ -225,10 +226,10 @@ struct Nearest {
 
 impl Order for Nearest {
     #[inline(always)]
-    fn bands(&mut self, opened: &Opened) -> [u32; LANES] {
+    fn bands(&mut self, opened: &Opened<Beyond>) -> [u32; LANES] {
         let mut bands = [0; LANES];
         for (k, band) in bands.iter_mut().enumerate() {
-            *band = band_of(1.0 + opened.beyond(k) * self.scale);
+            *band = band_of(1.0 + opened.found.by.0[k] * self.scale);
         }
         bands
     }

@@ -1,6 +1,7 @@
 //! Pairs of volumes in the order of how far motions leave them apart: what is violated first, the deepest before all.
 
 use super::bands::{BANDS, Bands, ByBand, OUT_OF_QUESTION, Order, band_of};
+use super::beyond::Beyond;
 use super::descent::Opened;
 use super::displacements::Motions;
 use super::facing_volumes::{FacingVolumes, Side};
@@ -99,7 +100,7 @@ impl<'a> Along<'a> {
 
 impl Order for Deepest<'_> {
     #[inline(always)]
-    fn bands(&mut self, opened: &Opened) -> [u32; LANES] {
+    fn bands(&mut self, opened: &Opened<Beyond>) -> [u32; LANES] {
         let (eight, one) = match opened.side {
             Side::Body => (&mut self.body, &mut self.obstacle),
             Side::Obstacle => (&mut self.obstacle, &mut self.body),
@@ -109,7 +110,7 @@ impl Order for Deepest<'_> {
         let (margin, scale) = (self.margin, 1.0 / self.margin);
         let mut bands = [0; LANES];
         for (k, band) in bands.iter_mut().enumerate() {
-            let gap = larger(margin + opened.beyond(k), 0.0);
+            let gap = larger(margin + opened.found.by.0[k], 0.0);
             let short = gap + larger(of_one, of_eight.0[k]) - self.target;
             let signed = signed_band_of(short * scale);
             let out_of_question = short > 0.0; // false for NaN

@@ -77,7 +77,7 @@ where
         let (body, obstacle) = trees;
         stack.clear();
         stack.push((ROOT, ROOT));
-        let mut opened = [Opened::NONE; AT_ONCE];
+        let mut opened = [Opened::nothing(Beyond::NONE); AT_ONCE];
         while !stack.is_empty() {
             let (most, mut count) = (at_once(stack.len()), 0);
             while count < most
@@ -92,11 +92,11 @@ where
                     continue;
                 }
                 work.node_pairs += 1;
-                opened[count] = open(trees, volumes, turned, (a, b));
+                opened[count] = open(&AtRest, trees, volumes, turned, (a, b));
                 count += 1;
             }
             for pair in opened[..count].iter().rev() {
-                pair.for_each(|(a, b), _| {
+                pair.for_each(pair.found.near, |(a, b), _| {
                     if wanted(body.owned(a), obstacle.owned(b)) {
                         stack.push((a, b));
                     }
@@ -106,178 +106,111 @@ where
     }
 }
 
-/// A pair of volumes at rest of which one was opened.
+/// A pair of volumes of which one was opened, and what was found of the other and each of the eight below.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Opened {
+pub(super) struct Opened<R> {
     /// The first child below the one that was opened.
     pub(super) first: Child,
     pub(super) other: Child,
     /// Whose volume was opened.
     pub(super) side: Side,
-    beyond: Beyond,
+    pub(super) found: R,
 }
 
-impl Opened {
-    pub(super) const NONE: Self = Self {
-        first: 0,
-        other: 0,
-        side: Side::Body,
-        beyond: Beyond::NONE,
-    };
-
-    /// By how much more than the margin a pair is apart at least, m; not above zero for those that may come near.
-    #[inline(always)]
-    pub(super) fn beyond(&self, lane: usize) -> f32 {
-        self.beyond.by.0[lane]
+impl<R> Opened<R> {
+    /// What was found of no pair.
+    pub(super) const fn nothing(found: R) -> Self {
+        Self {
+            first: 0,
+            other: 0,
+            side: Side::Body,
+            found,
+        }
     }
 
-    /// Hands on the pairs that may come near, facing each other, and their lanes.
+    /// Hands on the pairs of the eight whose bits are set, and their lanes.
     #[inline(always)]
-    pub(super) fn for_each(&self, mut each: impl FnMut((Child, Child), usize)) {
-        for_each_lane(self.beyond.near, |lane| {
+    pub(super) fn for_each(&self, mut mask: u32, mut each: impl FnMut((Child, Child), u32)) {
+        while mask != 0 {
+            let lane = mask.trailing_zeros();
             let child = self.first + lane;
             let pair = match self.side {
                 Side::Body => (child, self.other),
                 Side::Obstacle => (self.other, child),
             };
-            each(pair, lane as usize % LANES);
-        });
+            each(pair, lane);
+            mask &= mask - 1;
+        }
     }
 }
 
-/// Opens the thicker of two volumes at rest that are not both triangles.
-#[inline(always)]
-pub(super) fn open(
-    (body, obstacle): (&WideTree, &WideTree),
-    volumes: &FacingVolumes,
-    turned: &mut TurnedNodes,
-    (a, b): (Child, Child),
-) -> Opened {
-    match opened((body, obstacle), (a, b)) {
-        Some((Side::Body, node)) => {
-            let one = turned.of(volumes, Side::Obstacle, obstacle, b);
-            Opened {
-                first: node * LANES as u32,
-                other: b,
-                side: Side::Body,
-                beyond: beyond(&OneToEight {
-                    volumes,
-                    turned: one,
-                    lane: b as usize % LANES,
-                    node: body.node(node),
-                }),
-            }
-        }
-        Some((Side::Obstacle, node)) => {
-            let one = turned.of(volumes, Side::Body, body, a);
-            Opened {
-                first: node * LANES as u32,
-                other: a,
-                side: Side::Obstacle,
-                beyond: beyond(&OneToEight {
-                    volumes,
-                    turned: one,
-                    lane: a as usize % LANES,
-                    node: obstacle.node(node),
-                }),
-            }
-        }
-        None => Opened::NONE,
-    }
+/// How one volume is tested against eight. No closure: it is to be compiled with the vectors of the search that it is part of.
+pub(super) trait Test {
+    type Found;
+    const NOTHING: Self::Found;
+
+    /// `opened` says whose the eight are.
+    fn test(&self, opened: Side, pairs: &OneToEight) -> Self::Found;
 }
 
-/// A pair of volumes in motion of which one was opened.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OpenedInMotion {
-    first: Child,
-    other: Child,
-    side: Side,
-    windows: Windows,
-}
+/// By how much they are apart at rest.
+pub(super) struct AtRest;
 
-impl OpenedInMotion {
-    pub(super) const NONE: Self = Self {
-        first: 0,
-        other: 0,
-        side: Side::Body,
-        windows: Windows::NONE,
-    };
+impl Test for AtRest {
+    type Found = Beyond;
+    const NOTHING: Beyond = Beyond::NONE;
 
-    /// Hands on the pairs that come near in a window of their interval, and when they do.
     #[inline(always)]
-    pub(super) fn for_each(&self, mut each: impl FnMut((Child, Child), Window)) {
-        for_each_lane(self.windows.meeting(), |lane| {
-            let child = self.first + lane;
-            let pair = match self.side {
-                Side::Body => (child, self.other),
-                Side::Obstacle => (self.other, child),
-            };
-            each(pair, self.windows.of(lane));
-        });
+    fn test(&self, _: Side, pairs: &OneToEight) -> Beyond {
+        beyond(pairs)
     }
 }
 
-/// Opens the thicker of two volumes in motion that are not both triangles.
+/// When in a window they meet; without `TIMED` only whether.
+pub(super) struct InMotion<const TIMED: bool>(pub(super) Window);
+
+impl<const TIMED: bool> Test for InMotion<TIMED> {
+    type Found = Windows;
+    const NOTHING: Windows = Windows::NONE;
+
+    #[inline(always)]
+    fn test(&self, opened: Side, pairs: &OneToEight) -> Windows {
+        match opened {
+            Side::Body => windows::<false, TIMED>(pairs, self.0),
+            Side::Obstacle => windows::<true, TIMED>(pairs, self.0),
+        }
+    }
+}
+
+/// Opens the thicker of two volumes that are not both triangles, and tests what lies below against the other one.
 #[inline(always)]
-pub(super) fn open_in_motion<const TIMED: bool>(
+pub(super) fn open<T: Test>(
+    test: &T,
     (body, obstacle): (&WideTree, &WideTree),
     volumes: &FacingVolumes,
     turned: &mut TurnedNodes,
     (a, b): (Child, Child),
-    window: Window,
-) -> OpenedInMotion {
-    match opened((body, obstacle), (a, b)) {
-        Some((Side::Body, node)) => {
-            let one = turned.of(volumes, Side::Obstacle, obstacle, b);
-            let pairs = OneToEight {
-                volumes,
-                turned: one,
-                lane: b as usize % LANES,
-                node: body.node(node),
-            };
-            OpenedInMotion {
-                first: node * LANES as u32,
-                other: b,
-                side: Side::Body,
-                windows: windows::<false, TIMED>(&pairs, window),
-            }
-        }
-        Some((Side::Obstacle, node)) => {
-            let one = turned.of(volumes, Side::Body, body, a);
-            let pairs = OneToEight {
-                volumes,
-                turned: one,
-                lane: a as usize % LANES,
-                node: obstacle.node(node),
-            };
-            OpenedInMotion {
-                first: node * LANES as u32,
-                other: a,
-                side: Side::Obstacle,
-                windows: windows::<true, TIMED>(&pairs, window),
-            }
-        }
-        None => OpenedInMotion::NONE,
-    }
-}
-
-/// Which of two volumes is to be opened, and the node below it; `None` for two triangles.
-#[inline(always)]
-fn opened((body, obstacle): (&WideTree, &WideTree), (a, b): (Child, Child)) -> Option<(Side, u32)> {
-    match (body.below(a), obstacle.below(b)) {
-        (Below::Node(node), Below::Triangle(_)) => Some((Side::Body, node)),
-        (Below::Node(node), _) if body.thickness(a) > obstacle.thickness(b) => {
-            Some((Side::Body, node))
-        }
-        (_, Below::Node(node)) => Some((Side::Obstacle, node)),
-        (Below::Triangle(_), Below::Triangle(_)) => None,
-    }
-}
-
-#[inline(always)]
-fn for_each_lane(mut mask: u32, mut each: impl FnMut(u32)) {
-    while mask != 0 {
-        each(mask.trailing_zeros());
-        mask &= mask - 1;
+) -> Opened<T::Found> {
+    let (side, node) = match (body.below(a), obstacle.below(b)) {
+        (Below::Node(node), Below::Triangle(_)) => (Side::Body, node),
+        (Below::Node(node), _) if body.thickness(a) > obstacle.thickness(b) => (Side::Body, node),
+        (_, Below::Node(node)) => (Side::Obstacle, node),
+        (Below::Triangle(_), Below::Triangle(_)) => return Opened::nothing(T::NOTHING),
+    };
+    let (tree, other, one) = match side {
+        Side::Body => (body, b, turned.of(volumes, Side::Obstacle, obstacle, b)),
+        Side::Obstacle => (obstacle, a, turned.of(volumes, Side::Body, body, a)),
+    };
+    let pairs = OneToEight {
+        volumes,
+        turned: one,
+        lane: other as usize % LANES,
+        node: tree.node(node),
+    };
+    Opened {
+        first: node * LANES as u32,
+        other,
+        side,
+        found: test.test(side, &pairs),
     }
 }

@@ -2,17 +2,17 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::advancement::{PairSearch, TrianglePair};
+use super::advancement::{PairSearch, PiecePair};
 use super::agenda::{Agenda, Part, Waiting};
-use super::descent::{AT_ONCE, OpenedInMotion, at_once, open_in_motion};
+use super::collider::Collider;
+use super::descent::{AT_ONCE, InMotion, Opened, at_once, open};
 use super::impact::{AdvancementSettings, First};
 use super::intervals::{Interval, Intervals, WHOLE, halvings};
 use super::motion::RelativeMotion;
 use super::turned::TurnedNodes;
-use super::windows::Window;
+use super::windows::{Window, Windows};
 use super::work::Work;
 use super::workspace::CollisionWorkspace;
-use crate::geometry::Mesh;
 use crate::geometry::wide_tree::{Below, ROOT, WideTree};
 
 /// When volumes come near is worked out where the body moves by more than this share of the larger one's radius in half an interval. Otherwise
@@ -21,25 +21,45 @@ const TIMED_SHARE: f32 = 0.5;
 
 /// A body on its way and an obstacle.
 pub(super) struct Problem<'a> {
-    pub(super) body: &'a Mesh,
-    pub(super) obstacle: &'a Mesh,
+    pub(super) body: Collider<'a>,
+    pub(super) obstacle: Collider<'a>,
     pub(super) relative: &'a RelativeMotion,
+    /// Radius of the body about G, m.
+    pub(super) radius: f64,
     pub(super) settings: &'a AdvancementSettings,
 }
 
 impl Problem<'_> {
     #[inline]
-    pub(super) fn pair(&self, a: u32, b: u32) -> TrianglePair {
-        TrianglePair {
-            on_body: self.body.corners(a),
-            body_normal: *self.body.face_normal(a),
-            on_obstacle: self.obstacle.corners(b),
-            obstacle_normal: *self.obstacle.face_normal(b),
+    pub(super) fn pair(&self, a: u32, b: u32) -> PiecePair {
+        let (on_body, body_normal) = self.body.piece(a);
+        let (on_obstacle, obstacle_normal) = self.obstacle.piece(b);
+        PiecePair {
+            on_body,
+            body_normal,
+            on_obstacle,
+            obstacle_normal,
         }
+    }
+
+    /// The trees of both; `leaves` become those of primitives.
+    pub(super) fn trees<'t>(
+        &'t self,
+        [body, obstacle]: &'t mut [WideTree; 2],
+    ) -> (&'t WideTree, &'t WideTree) {
+        let start = self.relative.start();
+        let reached = (
+            &start,
+            self.relative.length(self.radius) + 2.0 * self.radius,
+        );
+        (
+            self.body.tree(body, reached),
+            self.obstacle.tree(obstacle, reached),
+        )
     }
 }
 
-/// A search for every pair of triangles that may face each other within the gap at some time before the first impact so far, with the vectors
+/// A search for every pair of pieces that may face each other within the gap at some time before the first impact so far, with the vectors
 /// that the processor has.
 pub(super) struct DescentInMotion<'a, 'p> {
     pub(super) problem: &'a Problem<'p>,
@@ -150,7 +170,6 @@ impl WithSimd for DescentInMotion<'_, '_> {
             workspace,
             work,
         } = self;
-        let trees = (problem.body.wide_tree(), problem.obstacle.wide_tree());
         let CollisionWorkspace {
             agenda,
             stack,
@@ -158,8 +177,10 @@ impl WithSimd for DescentInMotion<'_, '_> {
             current,
             intervals,
             turned,
+            leaves,
             ..
         } = workspace;
+        let trees = problem.trees(leaves);
         let memory = &memories[*current];
         intervals.restart(first.time, search.gaps.stop);
         let mut halving = Halving {
@@ -183,7 +204,7 @@ impl WithSimd for DescentInMotion<'_, '_> {
             last: Part::of(1.0),
         };
         let end = first.time;
-        let mut opened = [(OpenedInMotion::NONE, WHOLE); AT_ONCE];
+        let mut opened = [(Opened::nothing(Windows::NONE), WHOLE); AT_ONCE];
         loop {
             let (most, mut count) = (at_once(queue.stack.len()), 0);
             while count < most
@@ -223,10 +244,11 @@ impl WithSimd for DescentInMotion<'_, '_> {
                 work.node_pairs += 1;
                 let volumes = &interval.volumes;
                 let timed = volumes.sweeps_more_than(TIMED_SHARE * size);
+                let (pair, window) = ((a, b), next.window);
                 let pair = if timed {
-                    open_in_motion::<true>(trees, volumes, turned, (a, b), next.window)
+                    open(&InMotion::<true>(window), trees, volumes, turned, pair)
                 } else {
-                    open_in_motion::<false>(trees, volumes, turned, (a, b), next.window)
+                    open(&InMotion::<false>(window), trees, volumes, turned, pair)
                 };
                 opened[count] = (pair, next.interval);
                 count += 1;
@@ -237,7 +259,8 @@ impl WithSimd for DescentInMotion<'_, '_> {
             // What waited last goes on first.
             for (opened, number) in opened[..count].iter().rev() {
                 let interval = halving.interval(*number, turned);
-                opened.for_each(|pair, window| {
+                opened.for_each(opened.found.meeting(), |pair, lane| {
+                    let window = opened.found.of(lane);
                     let next = Waiting {
                         pair,
                         interval: *number,

@@ -1,7 +1,6 @@
 //! Distance between two surfaces at rest, by branch and bound over both trees.
 
 use super::motion::Placement;
-use super::still_box::STACK_CAPACITY;
 use crate::geometry::distance::{closest_on_triangles, triangles_intersect};
 use crate::geometry::{Mesh, Node};
 use crate::spatial::Pose;
@@ -13,7 +12,7 @@ pub fn distance(body: &Mesh, body_pose: &Pose, obstacle: &Mesh, obstacle_pose: &
     let bound =
         |i: u32, j: u32| lower_bound(&placement, &a_nodes[i as usize], &b_nodes[j as usize]);
     let mut least = f64::INFINITY;
-    let mut stack = Vec::with_capacity(STACK_CAPACITY);
+    let mut stack = Vec::new();
     stack.push((0, 0, bound(0, 0)));
     while let Some((i, j, at_least)) = stack.pop() {
         if at_least >= least {

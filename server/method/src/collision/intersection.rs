@@ -2,17 +2,38 @@
 
 use nalgebra::{Matrix3, Point3};
 
-use super::motion::Placement;
-use super::still_box::{STACK_CAPACITY, StillBoxes, for_triangle_pairs};
+use super::advancement::PairSearch;
+use super::collider::{Collider, Swept};
+use super::descent::for_facing_triangle_pairs;
+use super::descent_in_motion::Problem;
+use super::facing_volumes::FacingVolumes;
+use super::gaps::Gaps;
+use super::impact::AdvancementSettings;
+use super::motion::{Motion, Placement, RelativeMotion};
+use super::turned::TurnedNodes;
 use super::work::Work;
-use crate::geometry::Mesh;
-use crate::geometry::distance::triangles_intersect;
-use crate::spatial::Pose;
+use crate::geometry::wide_tree::{Child, WideTree};
+use crate::geometry::{Mesh, connected, surface_windings};
+use crate::spatial::{Pose, Vector6};
+use crate::world::{Body, Obstacle};
 
 /// A point has winding number 1 inside a solid and 0 outside; rounding is far below this.
 const INSIDE: f64 = 0.5;
 
-/// Whether the body and the obstacle share a point, surfaces or insides. For set-up: it allocates, and looks at every triangle.
+/// Whether the body at `body_pose` and the obstacle at `obstacle_pose` share a point, surfaces or insides; of primitives, what is not proved apart counts as
+/// shared. For set-up: it allocates, and looks at every triangle.
+pub fn shapes_intersect(
+    body: &Body,
+    body_pose: &Pose,
+    obstacle: &Obstacle,
+    obstacle_pose: &Pose,
+) -> bool {
+    // The meshes lie within their primitives: what is wholly inside the other is so with its mesh.
+    surfaces_intersect(body, body_pose, obstacle, obstacle_pose)
+        || meshes_intersect(&body.mesh, body_pose, &obstacle.mesh, obstacle_pose)
+}
+
+/// The same for two meshes.
 pub fn meshes_intersect(
     body: &Mesh,
     body_pose: &Pose,
@@ -24,42 +45,67 @@ pub fn meshes_intersect(
     }
     // Surfaces that do not meet leave each part wholly inside or wholly outside.
     let placement = Placement::of(body_pose, obstacle_pose);
-    part_vertices(body)
-        .iter()
-        .any(|v| winding_number(obstacle, &placement.point(v)) > INSIDE)
-        || part_vertices(obstacle)
-            .iter()
-            .any(|v| winding_number(body, &placement.back(v)) > INSIDE)
+    let winds = |mesh: &Mesh, p: &Point3<f64>| {
+        surface_windings(mesh.vertices(), mesh.triangles(), p) > INSIDE
+    };
+    part_vertices(body).any(|v| winds(obstacle, &placement.point(&v)))
+        || part_vertices(obstacle).any(|v| winds(body, &placement.back(&v)))
 }
 
-/// Whether the surfaces of body and obstacle share a point: a body that is wholly inside the obstacle does not count.
-pub(crate) fn surfaces_intersect(
-    body: &Mesh,
+/// Whether the surfaces of two meshes share a point, or a primitive of either is not proved apart from the other: a mesh that is wholly inside another does
+/// not count. For a body that was outside before a step that is shorter than it is thick, in the time that trees of boxes take. It allocates.
+pub fn surfaces_intersect<'a>(
+    body: impl Into<Collider<'a>>,
     body_pose: &Pose,
-    obstacle: &Mesh,
+    obstacle: impl Into<Collider<'a>>,
     obstacle_pose: &Pose,
 ) -> bool {
-    let placement = Placement::of(body_pose, obstacle_pose);
-    let boxes = StillBoxes::new(&placement, 0.0);
-    let mut intersect = false;
-    for_triangle_pairs(
-        body.tree(),
-        obstacle.tree(),
-        &mut Vec::with_capacity(STACK_CAPACITY),
-        &mut Work::default(),
-        |i, j| {
-            boxes.may_meet(
-                &body.tree().nodes()[i as usize],
-                &obstacle.tree().nodes()[j as usize],
-            )
-        },
-        |a, b, _| {
-            let on_body = body.corners(a).map(|p| placement.point(&p));
-            intersect = triangles_intersect(&on_body, &obstacle.corners(b));
-            !intersect
-        },
-    );
-    intersect
+    let (body, obstacle) = (body.into(), obstacle.into());
+    let rest = Motion {
+        start: *body_pose,
+        displacement: Vector6::zeros(),
+        reference_point: Point3::origin(),
+    };
+    let relative = RelativeMotion::new(&rest, obstacle_pose);
+    let settings = AdvancementSettings::default();
+    let problem = Problem {
+        body,
+        obstacle,
+        relative: &relative,
+        radius: body.radius_about(&Point3::origin()),
+        settings: &settings,
+    };
+    let search = PairSearch {
+        motion: &relative,
+        gaps: Gaps::new(0.0, 0.0, 0.0),
+        swept: Swept::of(&body, &obstacle),
+        max_iterations: 1,
+        cubic: 0.0,
+    };
+    let mut leaves = [WideTree::of_one_leaf(), WideTree::of_one_leaf()];
+    let memory = (&mut Vec::new(), &mut TurnedNodes::new());
+    problem.meets_at_start(&search, &mut leaves, memory, &mut Work::default())
+}
+
+impl Problem<'_> {
+    /// Whether pieces are not proved apart at the start.
+    pub(super) fn meets_at_start(
+        &self,
+        search: &PairSearch,
+        leaves: &mut [WideTree; 2],
+        (stack, turned): (&mut Vec<(Child, Child)>, &mut TurnedNodes),
+        work: &mut Work,
+    ) -> bool {
+        let (trees, start) = (self.trees(leaves), self.relative.at(0.0));
+        let volumes = FacingVolumes::still(trees, &start, 0.0, std::f64::consts::PI, turned);
+        let mut meets = false;
+        let (any, memory) = (|_, _| true, (stack, turned));
+        for_facing_triangle_pairs(trees, &volumes, memory, work, any, |a, b, _| {
+            meets = search.meets(&self.pair(a, b), &start);
+            !meets
+        });
+        meets
+    }
 }
 
 impl Placement {
@@ -83,39 +129,7 @@ impl Placement {
 }
 
 /// One vertex of each connected part of the surface.
-fn part_vertices(mesh: &Mesh) -> Vec<Point3<f64>> {
-    let mut seen = vec![false; mesh.vertices().len()];
-    let mut found = Vec::new();
-    let mut front = Vec::new();
-    for v in mesh.triangles().iter().map(|t| t[0]) {
-        if seen[v as usize] {
-            continue;
-        }
-        found.push(mesh.vertices()[v as usize]);
-        seen[v as usize] = true;
-        front.push(v);
-        while let Some(v) = front.pop() {
-            for &next in mesh.neighbours(v) {
-                if !seen[next as usize] {
-                    seen[next as usize] = true;
-                    front.push(next);
-                }
-            }
-        }
-    }
-    found
-}
-
-/// How often the surface winds around `p`: its solid angle over 4 pi.
-///
-/// Source: Van Oosterom and Strackee 1983.
-fn winding_number(mesh: &Mesh, p: &Point3<f64>) -> f64 {
-    let solid_angle = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|v| mesh.vertices()[v as usize] - p);
-        let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
-        let determinant = a.dot(&b.cross(&c));
-        let denominator = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-        2.0 * determinant.atan2(denominator)
-    };
-    mesh.triangles().iter().map(solid_angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+fn part_vertices(mesh: &Mesh) -> impl Iterator<Item = Point3<f64>> + '_ {
+    let parts = connected(mesh.triangles().len(), mesh.edges().iter().map(|e| e.faces));
+    parts.into_iter().map(|part| mesh.corners(part[0])[0])
 }

@@ -103,6 +103,11 @@ impl RelativeMotion {
         }
     }
 
+    /// G at time 0, obstacle frame.
+    pub(super) fn start(&self) -> Point3<f64> {
+        Point3::from(self.start)
+    }
+
     /// Where the body is at `time`.
     pub(crate) fn at(&self, time: f64) -> Placement {
         let turn = Rotation3::from_scaled_axis(self.spin * time).into_inner();
@@ -141,31 +146,31 @@ impl RelativeMotion {
     }
 
     /// Whether every number of the motion is finite.
-    pub(crate) fn is_finite(&self) -> bool {
+    pub(super) fn is_finite(&self) -> bool {
         let vectors = [&self.start, &self.velocity, &self.spin];
         vectors.iter().all(|v| v.iter().all(|c| c.is_finite()))
             && self.rotation.iter().all(|c| c.is_finite())
     }
 
     /// Bound on the path of the body's fastest point, given its radius about G, m.
-    pub(crate) fn length(&self, radius: f64) -> f64 {
+    pub(super) fn length(&self, radius: f64) -> f64 {
         self.velocity.norm() + self.rate * radius
     }
 
     /// Whether the body, given its radius about G, stays farther than `gap` (m) from an obstacle that is `distance` (m) from a point, at least: G goes
     /// straight, and however the body turns, its points stay within the radius of G.
-    pub(crate) fn stays_beyond(
+    pub(super) fn stays_beyond(
         &self,
         gap: f64,
         radius: f64,
         distance: impl FnOnce(&Point3<f64>) -> f64,
     ) -> bool {
-        let least = distance(&Point3::from(self.start)) - self.velocity.norm() - radius;
+        let least = distance(&self.start()) - self.velocity.norm() - radius;
         least > gap // false for NaN
     }
 
     /// Largest coordinate that the body or the motion reaches, given its radius about G, m. Rounding is relative to it.
-    pub(crate) fn reach(&self, radius: f64) -> f64 {
+    pub(super) fn reach(&self, radius: f64) -> f64 {
         self.start.amax() + self.velocity.amax() + radius + self.reference_point.coords.amax()
     }
 }

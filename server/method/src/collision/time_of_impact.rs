@@ -3,7 +3,7 @@
 //! Both trees are descended together. A pair of volumes is looked at in the window of time in which it may be near; pairs come in the order of
 //! their windows ([`agenda`](super::agenda)), so that hardly any is looked at that comes near after the first impact. Where the path of a
 //! volume is too curved for a straight one in an interval of time, the pair is looked at in both halves of it. A pair of
-//! triangles is followed by conservative advancement in its window: before that, it is farther apart than the gap.
+//! pieces ([`collider`](super::collider)) is followed by conservative advancement in its window: before that, it is farther apart than the gap.
 //!
 //! **Only what faces.** Let the surfaces start farther apart than the gap g, and let t be the first time at which their distance is
 //! g, between points x of the body and y of the obstacle. No other points are nearer, so x is a local minimum of the distance to
@@ -14,7 +14,7 @@
 //! pair that arrives first is never among them. Bodies that start nearer are searched again with a gap below their distance,
 //! which the same pair of points at the start tells: x and y are a global minimum there, too, and so facing.
 //! Surfaces that cross at the start have no such pair; crossing is looked for first, wherever no search before has
-//! shown that they are apart.
+//! shown that they are apart. Primitives are solids with normals all ways: what crosses them is near them.
 //!
 //! **Never late.** Every bound is one-sided in exact arithmetic ([`advancement`](super), [`still_box`](super)). In floating
 //! point the coordinates of both bodies are off by some units in the last place of the largest coordinate on the way
@@ -26,16 +26,13 @@
 use nalgebra::Point3;
 
 use super::advancement::PairSearch;
-use super::descent::for_facing_triangle_pairs;
+use super::collider::{Collider, Swept};
 use super::descent_in_motion::{DescentInMotion, Problem};
-use super::facing_volumes::FacingVolumes;
 use super::gaps::Gaps;
 use super::impact::{AdvancementSettings, First, TimeOfImpact};
 use super::motion::{Motion, RelativeMotion};
 use super::work::Work;
 use super::workspace::CollisionWorkspace;
-use crate::geometry::Mesh;
-use crate::geometry::distance::triangles_intersect;
 use crate::spatial::Pose;
 
 /// Rounding of a computed distance relative to the largest coordinate on the way: see the file's head.
@@ -49,18 +46,40 @@ const LONGEST: f64 = 1e15;
 /// Finds a time up to which the body may move: the gap is at least `minimum_gap` all the way and there.
 ///
 /// Never late; early by at most what `gap_tolerance` leaves. Motions that slide or leave are free even at the minimum gap.
-/// A motion with NaN, or over 1e15 m or rad, stops at 0. The solids must be apart at the start; where their surfaces cross, the answer says so. No allocation.
-pub fn time_of_impact(
-    body: &Mesh,
+/// A motion with NaN, or over 1e15 m or rad, stops at 0, as does a half-space that is the body. The solids must be apart at the start; where their
+/// surfaces cross, the answer says so. No allocation.
+pub fn time_of_impact<'a>(
+    body: impl Into<Collider<'a>>,
     motion: &Motion,
-    obstacle: &Mesh,
+    obstacle: impl Into<Collider<'a>>,
+    obstacle_pose: &Pose,
+    settings: &AdvancementSettings,
+    workspace: &mut CollisionWorkspace,
+    work: &mut Work,
+) -> TimeOfImpact {
+    let (body, obstacle) = (body.into(), obstacle.into());
+    search(
+        body,
+        motion,
+        obstacle,
+        obstacle_pose,
+        settings,
+        workspace,
+        work,
+    )
+}
+
+fn search(
+    body: Collider<'_>,
+    motion: &Motion,
+    obstacle: Collider<'_>,
     obstacle_pose: &Pose,
     settings: &AdvancementSettings,
     workspace: &mut CollisionWorkspace,
     work: &mut Work,
 ) -> TimeOfImpact {
     let relative = RelativeMotion::new(motion, obstacle_pose);
-    let radius = body.radius_bound_about(&motion.reference_point);
+    let radius = body.radius_about(&motion.reference_point);
     let finite = relative.is_finite()
         && relative.reach(radius) + relative.length(radius) + relative.rate < LONGEST
         && settings.minimum_gap.is_finite()
@@ -68,17 +87,13 @@ pub fn time_of_impact(
     if !finite {
         return TimeOfImpact::Impact { time: 0.0 };
     }
-    let obstacle_reach = obstacle
-        .bounding_box()
-        .iter()
-        .map(|p| p.coords.amax())
-        .fold(0.0, f64::max);
     let world_reach =
         motion.start.translation.vector.amax() + obstacle_pose.translation.vector.amax();
-    let slack = ROUNDING * (relative.reach(radius) + obstacle_reach + world_reach);
+    let slack = ROUNDING * (relative.reach(radius) + obstacle.reach() + world_reach);
     let search = PairSearch {
         motion: &relative,
         gaps: Gaps::new(settings.minimum_gap, settings.gap_tolerance, slack),
+        swept: Swept::of(&body, &obstacle),
         max_iterations: settings.max_iterations,
         cubic: relative.rate.powi(3) * radius / 6.0,
     };
@@ -86,14 +101,15 @@ pub fn time_of_impact(
         body,
         obstacle,
         relative: &relative,
+        radius,
         settings,
     };
     // What is far away is left alone before its tree is touched.
-    if relative.stays_beyond(search.gaps.stop, radius, |g| obstacle.box_distance(g)) {
+    if relative.stays_beyond(search.gaps.stop, radius, |g| obstacle.distance(g)) {
         problem.note_apart(&search, 1.0, workspace);
         return TimeOfImpact::Separated;
     }
-    if problem.crosses_at_start(radius, workspace, work) {
+    if problem.crosses_at_start(&search, workspace, work) {
         return TimeOfImpact::Overlapping;
     }
     let mut tried = Some(search);
@@ -122,52 +138,44 @@ pub fn time_of_impact(
 }
 
 impl Problem<'_> {
-    /// Whether the surfaces cross at the start: looked at where no search before this one has shown that they do not.
+    /// Whether the surfaces of two meshes cross at the start: looked at where no search before this one has shown that they do not.
     fn crosses_at_start(
         &self,
-        radius: f64,
+        search: &PairSearch,
         workspace: &mut CollisionWorkspace,
         work: &mut Work,
     ) -> bool {
+        let Some(key) = self.key() else { return false };
         let start = self.relative.at(0.0);
-        let radii = [radius, self.obstacle.radius_bound_about(&Point3::origin())];
-        if workspace.memory().apart.knows(self.key(), &start, radii) {
+        let radii = [self.radius, self.obstacle.radius_about(&Point3::origin())];
+        if workspace.memory().apart.knows(key, &start, radii) {
             return false;
         }
-        let trees = (self.body.wide_tree(), self.obstacle.wide_tree());
-        let volumes = FacingVolumes::still(
-            trees,
-            &start,
-            0.0,
-            std::f64::consts::PI,
-            &mut workspace.turned,
-        );
-        let mut crosses = false;
-        let any = |_, _| true;
-        for_facing_triangle_pairs(
-            trees,
-            &volumes,
-            (&mut workspace.pairs, &mut workspace.turned),
-            work,
-            any,
-            |a, b, _| {
-                let on_body = self.body.corners(a).map(|p| start.point(&p));
-                crosses = triangles_intersect(&on_body, &self.obstacle.corners(b));
-                !crosses
-            },
-        );
-        crosses
+        let CollisionWorkspace {
+            pairs,
+            turned,
+            leaves,
+            ..
+        } = workspace;
+        self.meets_at_start(search, leaves, (pairs, turned), work)
     }
 
-    fn key(&self) -> [u64; 2] {
-        [self.body.identity(), self.obstacle.identity()]
+    /// The identities of two meshes.
+    fn key(&self) -> Option<[u64; 2]> {
+        match (self.body, self.obstacle) {
+            (Collider::Mesh(body), Collider::Mesh(obstacle)) => {
+                Some([body.identity(), obstacle.identity()])
+            }
+            _ => None,
+        }
     }
 
     /// Remembers that the surfaces stay apart by the gap of a search up to a time.
     fn note_apart(&self, search: &PairSearch, until: f64, workspace: &mut CollisionWorkspace) {
+        let Some(key) = self.key() else { return };
         let kept = search.gaps.stop - search.gaps.slack;
         let apart = &mut workspace.memory_mut().apart;
-        apart.remember(self.key(), self.relative, until, kept);
+        apart.remember(key, self.relative, until, kept);
     }
 
     /// The earliest impact; `Err` with the distance when some pair is nearer than the gap to stop at from the beginning.
@@ -181,7 +189,7 @@ impl Problem<'_> {
 
         // The nearest pairs of the last search bound the time before the trees are touched.
         let start = self.relative.at(0.0);
-        let (bodies, obstacles) = (self.body.triangles().len(), self.obstacle.triangles().len());
+        let (bodies, obstacles) = (self.body.pieces(), self.obstacle.pieces());
         for (a, b) in workspace
             .memory()
             .pairs()

@@ -7,13 +7,13 @@ use super::bands::Bands;
 use super::descent::{AT_ONCE, WIDE_STACK_CAPACITY};
 use super::intervals::{Intervals, MAX_HALVINGS};
 use super::known_apart::KnownApart;
-use super::still_box::STACK_CAPACITY;
 use super::turned::TurnedNodes;
 use crate::constraint::Contact;
+use crate::geometry::wide_tree::WideTree;
 
 /// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
 pub(crate) const MAX_CANDIDATES: usize = 8192;
-/// Triangle pairs kept from one search to the next.
+/// Pairs of pieces kept from one search to the next.
 pub(crate) const MAX_WITNESSES: usize = 64;
 
 /// What the searches remember of the body and one obstacle.
@@ -70,6 +70,8 @@ pub struct CollisionWorkspace {
     pub(crate) memories: Vec<Memory>,
     pub(crate) current: usize,
     pub(crate) turned: TurnedNodes,
+    /// Of primitives, the body's and the obstacle's, in the search under way.
+    pub(super) leaves: [WideTree; 2],
     pub(crate) candidates: Vec<Contact>,
     pub(crate) candidate_limit: usize,
 }
@@ -91,7 +93,7 @@ impl CollisionWorkspace {
     /// The same with room for `candidates` contacts to choose from: every one of a conforming contact, for references.
     pub fn with_candidates(candidates: usize) -> Self {
         Self {
-            pairs: Vec::with_capacity(STACK_CAPACITY.max(WIDE_STACK_CAPACITY)),
+            pairs: Vec::with_capacity(WIDE_STACK_CAPACITY),
             bands: Bands::new(),
             agenda: Agenda::new(),
             // Each pair opened may have been cut into its shortest interval before.
@@ -100,6 +102,7 @@ impl CollisionWorkspace {
             memories: vec![Memory::default()],
             current: 0,
             turned: TurnedNodes::new(),
+            leaves: [WideTree::of_one_leaf(), WideTree::of_one_leaf()],
             candidates: Vec::with_capacity(candidates),
             candidate_limit: candidates,
         }

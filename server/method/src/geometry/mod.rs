@@ -27,6 +27,7 @@ pub use mesh_error::MeshError;
 pub use nearest::{NearestOnMesh, nearest_on_mesh};
 pub use normals::corner_normals;
 pub use one_sided_distance::{OneSidedDistance, one_sided_distance};
+pub(crate) use parts::surface_windings;
 pub use parts::{ClosedPart, InvertedPart, closed_parts, connected};
 pub use report::{MeshPlaces, MeshReport};
 pub use self_contact::{SelfContact, self_contact};

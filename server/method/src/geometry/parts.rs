@@ -100,7 +100,7 @@ fn encloses(vertices: &[Point3<f64>], triangles: &[[u32; 3]], other: &Part, own:
 }
 
 /// How often a surface winds around a point, by the sum of the solid angles: whole off a closed surface.
-pub(super) fn surface_windings(
+pub(crate) fn surface_windings(
     vertices: &[Point3<f64>],
     triangles: &[[u32; 3]],
     point: &Point3<f64>,

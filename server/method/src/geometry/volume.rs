@@ -33,6 +33,8 @@ const OUTWARD_DOUBLE: f64 = 8.0 * f64::EPSILON;
 /// precision.
 const SEPARATION_ROUNDING: f64 = 80.0 * f32::EPSILON as f64;
 const CENTER_ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
+/// By how much more those of a primitive are, whose extents are not measured along the axes that single precision holds.
+const AXIS_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 /// Cones are wider than computed by this, rad: the rounding of an arc tangent, and then some.
 const CONE_ROUNDING: f64 = 1e-7;
 /// A rectangle may be larger by this share than that along the longest way, to lie as the strip does that it is of.
@@ -56,6 +58,37 @@ pub(crate) struct Volume {
     pub(crate) sine: f32,
     /// Which kinds of features the triangles inside own, as the bits of [`Mesh::owned_features`](crate::Mesh::owned_features).
     pub(super) owned: u8,
+}
+
+impl Volume {
+    /// That of a convex piece about `center`, mesh axes, with normals all ways: about the axis of the slab and the tangent, the slab's middle and half its
+    /// thickness, half the sides of the strip along the tangent and across it, half those of the box, and the radius, m.
+    pub(crate) fn of_piece(
+        center: &Point3<f64>,
+        [axis, tangent]: [Vector3<f64>; 2],
+        [middle, slab]: [f64; 2],
+        [along, across]: [f64; 2],
+        half: Vector3<f64>,
+        radius: f64,
+    ) -> Self {
+        let error = OUTWARD_DOUBLE * (2.0 * center.coords.amax() + radius);
+        let lost = (SEPARATION_ROUNDING + AXIS_ROUNDING) * radius + error;
+        let wider = |length: f64| (length * (1.0 + 2.0 * OUTWARD) + lost) as f32;
+        Self {
+            center: [0.0; 3],
+            half: half.map(wider).into(),
+            axis: axis.map(|x| x as f32).into(),
+            tangent: tangent.map(|x| x as f32).into(),
+            middle: middle as f32,
+            slab: wider(slab),
+            along: wider(along),
+            across: wider(across),
+            radius: wider(radius),
+            cosine: -1.0,
+            sine: 0.0,
+            owned: 0,
+        }
+    }
 }
 
 /// What the build of a wide tree reads.

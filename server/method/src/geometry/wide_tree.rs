@@ -127,6 +127,25 @@ impl WideTree {
         tree
     }
 
+    /// With one leaf, which is to be held.
+    pub(crate) fn of_one_leaf() -> Self {
+        let mut tree = Self {
+            nodes: Vec::new(),
+            entries: Vec::new(),
+            origin: Point3::origin(),
+            reach: 0.0,
+        };
+        tree.add_node([0.0; 3]);
+        tree
+    }
+
+    /// Makes the one leaf of a tree this volume about `origin`, `reach` (m) long from there.
+    pub(crate) fn hold(&mut self, origin: Point3<f64>, reach: f64, volume: &Volume) {
+        (self.origin, self.reach) = (origin, reach);
+        self.set(ROOT, *volume);
+        self.entries[ROOT as usize].below = TRIANGLE;
+    }
+
     /// Appends a node without children; its number.
     fn add_node(&mut self, origin: [f32; 3]) -> u32 {
         let index = self.nodes.len() as u32;

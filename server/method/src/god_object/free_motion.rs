@@ -2,9 +2,8 @@
 
 use super::placed_obstacle::PlacedObstacle;
 use super::{GodObject, StepReport};
-use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
+use crate::collision::{AdvancementSettings, Motion, TimeOfImpact, time_of_impact};
 use crate::settings::Settings;
-use crate::shape;
 
 impl GodObject {
     /// The fraction of the motion that is free of every obstacle but those that go along, in [0, 1], and which obstacle stops it there.
@@ -22,7 +21,7 @@ impl GodObject {
             if goes_along(placed) {
                 continue;
             }
-            let found = shape::time_of_impact(
+            let found = time_of_impact(
                 &self.world.body,
                 &motion,
                 obstacle,

@@ -1,9 +1,11 @@
 //! Whether a god-object can start where it is, and why not.
 
 use super::GodObject;
-use crate::collision::{CollisionWorkspace, Motion, TimeOfImpact, Work};
+use crate::collision::{
+    CollisionWorkspace, Motion, TimeOfImpact, Work, shapes_intersect, time_of_impact,
+};
 use crate::settings::{Settings, SettingsError};
-use crate::shape::{self, PrimitiveError, check_primitives, shapes_intersect};
+use crate::shape::{self, PrimitiveError, check_primitives};
 use crate::spatial::{Pose, Vector6, at_reference_point, pose_is_finite};
 use crate::world::{Body, Obstacle, World};
 
@@ -92,7 +94,7 @@ fn can_stay(
     workspace: &mut CollisionWorkspace,
 ) -> bool {
     let reference_point = body.reference_point;
-    let found = shape::time_of_impact(
+    let found = time_of_impact(
         body,
         &Motion {
             start: at_reference_point(start, &reference_point),

@@ -149,7 +149,7 @@ impl MeshSide<'_> {
         work: &mut Work,
     ) {
         let touching = Touching::of(self.primitive, Some(placement), self.mesh_moves);
-        let bound = Bound::still(
+        let bound = Bound::new(
             self.primitive,
             self.mesh_moves,
             placement,

@@ -5,10 +5,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::closest;
 use super::cylinder::{CROSSINGS, Cylinder};
 use super::element::{Cone, Rod, Row};
-use super::piece::Piece;
+use crate::collision::{Core, Disc, direction};
 use crate::constraint::{Feature, LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE};
 
 /// Projections from rim to rim before Newton's method takes over.
@@ -107,13 +106,12 @@ fn overlapping_caps(a: &Cylinder, b: &Cylinder, mut found: impl FnMut(Row)) {
 /// Where two rims are locally nearest, from two starts for each pair of rims: the nearest points of the two solids, and those of one rim to the
 /// centre of the other.
 fn rim_on_rim(a: &Cylinder, b: &Cylinder, reach: f64, mut found: impl FnMut(Row)) {
-    let solids = [a, b].map(|c| Piece {
+    let solids = [a, b].map(|c| Core {
         points: [c.ends[0], c.ends[1], c.ends[1]],
-        count: 2,
-        round: 0.0,
-        disc: c.radius,
-        axis: c.axis,
-        face: None,
+        disc: Some(Disc {
+            radius: c.radius,
+            axis: c.axis,
+        }),
     });
     let mut nearest = None;
     for i in 0..2 {
@@ -122,7 +120,7 @@ fn rim_on_rim(a: &Cylinder, b: &Cylinder, reach: f64, mut found: impl FnMut(Row)
             if centers.norm() > reach + a.radius + b.radius {
                 continue;
             }
-            let normal = nearest.get_or_insert_with(|| closest::direction(&solids[0], &solids[1]));
+            let normal = nearest.get_or_insert_with(|| direction(&solids[0], &solids[1]));
             let starts = [solids[0].farthest(&-*normal), b.ends[j]];
             let mut first: Option<Row> = None;
             for start in starts {

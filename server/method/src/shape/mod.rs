@@ -4,36 +4,31 @@
 //! independent checks. Two meshes go the way of [`collision`](crate::collision) and [`constraint`](crate::constraint); all else is here. Spheres,
 //! capsules and cylinders have no facets: normals are exact, and sliding round them is smooth.
 
-mod advancement;
 mod bound;
-mod closest;
 mod collect;
 mod cylinder;
 mod cylinder_pair;
 mod element;
 mod implied;
-mod intersection;
-mod piece;
-mod primitive;
+pub(crate) mod primitive;
 #[cfg(test)]
 mod primitive_tests;
 mod rim;
 mod separation;
-mod time_of_impact;
 mod touching;
 
-pub use intersection::{shape_surfaces_intersect, shapes_intersect};
 pub use primitive::{Nearest, Primitive, PrimitiveError};
 pub(crate) use separation::separation;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::collision::{AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work};
+use crate::collision::{
+    AdvancementSettings, Collider, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
+};
 use crate::constraint::{Collected, Contact, collect_contacts};
 use crate::spatial::{Pose, Vector6, advance_pose, at_reference_point, pose_difference};
 use crate::world::{Body, Obstacle, World};
 use collect::Pairing;
-use time_of_impact::Form;
 
 /// Says which primitive of a world cannot be used, by its body's name, and why.
 pub(crate) fn check_primitives(world: &World) -> Result<(), (String, PrimitiveError)> {
@@ -54,40 +49,6 @@ pub(crate) fn check_primitives(world: &World) -> Result<(), (String, PrimitiveEr
     Ok(())
 }
 
-/// [`collision::time_of_impact`](crate::collision::time_of_impact) for any shapes: never late, the gap is at least `minimum_gap` all the
-/// way, NaN stops at 0, no allocation. A half-space as the body stops at 0.
-pub fn time_of_impact(
-    body: &Body,
-    motion: &Motion,
-    obstacle: &Obstacle,
-    obstacle_pose: &Pose,
-    settings: &AdvancementSettings,
-    workspace: &mut CollisionWorkspace,
-    work: &mut Work,
-) -> TimeOfImpact {
-    if body.primitive.is_none() && obstacle.primitive.is_none() {
-        let (body, obstacle) = (&body.mesh, &obstacle.mesh);
-        return crate::collision::time_of_impact(
-            body,
-            motion,
-            obstacle,
-            obstacle_pose,
-            settings,
-            workspace,
-            work,
-        );
-    }
-    time_of_impact::time_of_impact(
-        Form::of(&body.mesh, body.primitive.as_ref()),
-        motion,
-        Form::of(&obstacle.mesh, obstacle.primitive.as_ref()),
-        obstacle_pose,
-        settings,
-        workspace,
-        work,
-    )
-}
-
 /// Bound on how far a body is from an obstacle at least, m, with its reference point at `center`, world, and however it is turned.
 pub(crate) fn distance_at_least(
     body: &Body,
@@ -95,10 +56,9 @@ pub(crate) fn distance_at_least(
     obstacle: &Obstacle,
     obstacle_pose: &Pose,
 ) -> f64 {
-    let held = Form::of(&body.mesh, body.primitive.as_ref());
-    let other = Form::of(&obstacle.mesh, obstacle.primitive.as_ref());
     let center = obstacle_pose.inverse_transform_point(center);
-    other.distance(&center) - held.radius_about(&body.reference_point)
+    let radius = Collider::from(body).radius_about(&body.reference_point);
+    Collider::from(obstacle).distance(&center) - radius
 }
 
 /// The way of an obstacle to a pose while the body stands.
@@ -174,35 +134,15 @@ pub(crate) fn time_of_impact_of_obstacle(
     workspace: &mut CollisionWorkspace,
     work: &mut Work,
 ) -> TimeOfImpact {
-    let motion = match way {
-        ObstacleWay::Straight(motion) => motion,
-        ObstacleWay::AsSeenFromObstacle { body: motion, .. } => {
-            return time_of_impact(
-                body,
-                motion,
-                obstacle,
-                &Pose::identity(),
-                settings,
-                workspace,
-                work,
-            );
+    match way {
+        ObstacleWay::Straight(motion) => {
+            time_of_impact(obstacle, motion, body, body_pose, settings, workspace, work)
         }
-    };
-    if body.primitive.is_none() && obstacle.primitive.is_none() {
-        let (moving, still) = (&obstacle.mesh, &body.mesh);
-        return crate::collision::time_of_impact(
-            moving, motion, still, body_pose, settings, workspace, work,
-        );
+        ObstacleWay::AsSeenFromObstacle { body: motion, .. } => {
+            let stands = Pose::identity();
+            time_of_impact(body, motion, obstacle, &stands, settings, workspace, work)
+        }
     }
-    time_of_impact::time_of_impact(
-        Form::of(&obstacle.mesh, obstacle.primitive.as_ref()),
-        motion,
-        Form::of(&body.mesh, body.primitive.as_ref()),
-        body_pose,
-        settings,
-        workspace,
-        work,
-    )
 }
 
 /// [`collect_contacts`] for any shapes: appends every contact within `activation_distance` (m) to `out`, nearest first.

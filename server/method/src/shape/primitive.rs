@@ -149,23 +149,6 @@ impl Primitive {
         }
     }
 
-    /// The smallest length of the form, m; infinite for a half-space.
-    pub(crate) fn smallest_length(&self) -> f64 {
-        match self {
-            Self::Sphere { radius, .. } | Self::Capsule { radius, .. } => *radius,
-            Self::Cylinder { ends, radius } => radius.min((ends[1] - ends[0]).norm()),
-            Self::Plane { .. } => f64::INFINITY,
-        }
-    }
-
-    /// Largest coordinate of the solid, m: rounding is relative to it. For a half-space, of its point.
-    pub(crate) fn reach(&self) -> f64 {
-        match self {
-            Self::Plane { point, .. } => point.coords.amax(),
-            _ => self.radius_about(&Point3::origin()),
-        }
-    }
-
     /// Volume, centroid and inertia in closed form; `None` for a half-space.
     pub fn mass_properties(&self) -> Option<MassProperties> {
         use std::f64::consts::PI;
@@ -210,13 +193,13 @@ impl Primitive {
 
 /// The unit vector from the first end to the second.
 #[inline]
-pub(super) fn unit_axis(ends: &[Point3<f64>; 2]) -> Vector3<f64> {
+pub(crate) fn unit_axis(ends: &[Point3<f64>; 2]) -> Vector3<f64> {
     let along = ends[1] - ends[0];
     along / along.norm()
 }
 
 /// A unit vector across a unit vector.
-pub(super) fn across(axis: &Vector3<f64>) -> Vector3<f64> {
+pub(crate) fn across(axis: &Vector3<f64>) -> Vector3<f64> {
     let other = axis.cross(&Vector3::ith(axis.iamin(), 1.0));
     other / other.norm()
 }

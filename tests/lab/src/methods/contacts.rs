@@ -1,9 +1,11 @@
 //! What the baselines share: contacts near a pose, as rows, and limits of the force.
 
-use god_object::collision::{CollisionWorkspace, Work};
+use god_object::collision::{
+    CollisionWorkspace, Work, shapes_intersect, surfaces_intersect,
+};
 use god_object::constraint::{Contact, Separation};
 use god_object::quasi_statics::{HalfSpace, Metric, ProjectionStatus, Projector};
-use god_object::shape::{collect, shape_surfaces_intersect, shapes_intersect};
+use god_object::shape::collect;
 use god_object::spatial::{angular, linear, six};
 use god_object::{ConstraintSet, NonPenetrationConstraint, Pose, Settings, Vector6, World};
 use nalgebra::Point3;
@@ -50,16 +52,17 @@ impl ContactFinder {
 /// way is not looked at; nor whether a mesh is wholly inside another, where the motion is shorter than the body is thick.
 pub(super) fn free_share(world: &World, length: f64, at: impl Fn(f64) -> Pose) -> f64 {
     let [low, high] = world.body.mesh.bounding_box();
-    let overlaps = if length < (high - low).amin() {
-        shape_surfaces_intersect
-    } else {
-        shapes_intersect
-    };
+    let short = length < (high - low).amin();
+    let body = &world.body;
     let intersects = |share: f64| {
         let pose = at(share);
-        let obstacles = world.obstacles.iter();
-        let mut all = obstacles.map(|o| overlaps(&world.body, &pose, o, &o.pose));
-        all.any(|overlap| overlap)
+        world.obstacles.iter().any(|o| {
+            if short {
+                surfaces_intersect(body, &pose, o, &o.pose)
+            } else {
+                shapes_intersect(body, &pose, o, &o.pose)
+            }
+        })
     };
     if !intersects(1.0) {
         return 1.0;

@@ -10,9 +10,10 @@
 
 use std::sync::Arc;
 
-use god_object::collision::{AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work};
+use god_object::collision::{
+    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
+};
 use god_object::quasi_statics::{HalfSpace, Metric, ProjectionStatus, Projector};
-use god_object::shape::time_of_impact;
 use god_object::spatial::{at_reference_point, linear, six};
 use god_object::{Pose, Settings, SolverKind, Vector6, World};
 use nalgebra::{Matrix3, Translation3, Vector3};

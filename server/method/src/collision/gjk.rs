@@ -1,13 +1,12 @@
-//! The direction in which two convex pieces are apart.
+//! The direction in which two convex pieces are apart, of which one is a cylinder or both are, without balls.
 //!
-//! Polytope cores have closed forms. A cylinder's is searched by the algorithm of Gilbert, Johnson and Keerthi. Nothing depends on its accuracy but
-//! progress: every direction gives a valid lower bound of the distance.
+//! Nothing depends on its accuracy but progress: every direction gives a valid lower bound of the distance.
 //! Source: Gilbert, Johnson, Keerthi 1988.
 
 use nalgebra::{Point3, Vector3};
 
-use super::piece::Piece;
-use crate::geometry::distance::{closest_on_triangle, closest_on_triangles};
+use super::collider::Disc;
+use crate::geometry::distance::closest_on_triangle;
 
 /// Most supports looked at: smooth rims take some 20.
 const MAX_SUPPORTS: u32 = 48;
@@ -16,29 +15,38 @@ const RELATIVE_ACCURACY: f64 = 1e-6;
 /// Two supports nearer than this, relative to their size, are one.
 const SAME_POINT: f64 = 1e-28;
 
-/// Unit direction from `still` to `mover` along which they are apart, the ball radii left out; NaN or any where they overlap.
-pub(super) fn direction(mover: &Piece, still: &Piece) -> Vector3<f64> {
-    if mover.disc > 0.0 || still.disc > 0.0 {
-        return searched_direction(mover, still);
+/// A convex piece without a ball around it, in some frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Core {
+    /// Corners of a triangle, ends of a segment, or a point; the last is repeated.
+    pub(crate) points: [Point3<f64>; 3],
+    /// Swept over them.
+    pub(crate) disc: Option<Disc>,
+}
+
+impl Core {
+    /// The point that is farthest along `n`.
+    #[inline]
+    pub(crate) fn farthest(&self, n: &Vector3<f64>) -> Point3<f64> {
+        let mut best = self.points[0];
+        for p in &self.points[1..] {
+            if n.dot(&(p - best)) > 0.0 {
+                best = *p;
+            }
+        }
+        if let Some(Disc { radius, axis }) = self.disc {
+            let sideways = n - axis * axis.dot(n);
+            let length = sideways.norm();
+            if length > 0.0 {
+                best += sideways * (radius / length);
+            }
+        }
+        best
     }
-    let difference = if mover.count == 1 {
-        mover.points[0] - closest_on_triangle(&mover.points[0], &still.points).point
-    } else if still.count == 1 {
-        closest_on_triangle(&still.points[0], &mover.points).point - still.points[0]
-    } else {
-        let closest = closest_on_triangles(&mover.points, &still.points);
-        closest.on_first - closest.on_second
-    };
-    difference / difference.norm()
 }
 
-/// A simplex of the difference of the two pieces, nearest to the origin.
-struct Simplex {
-    corners: [Point3<f64>; 4],
-    count: usize,
-}
-
-fn searched_direction(mover: &Piece, still: &Piece) -> Vector3<f64> {
+/// Unit direction from `still` to `mover` along which they are apart; NaN or any where they overlap.
+pub(crate) fn direction(mover: &Core, still: &Core) -> Vector3<f64> {
     let support = |n: &Vector3<f64>| Point3::from(mover.farthest(&-n) - still.farthest(n));
     let start = mover.points[0] - still.points[0];
     let mut nearest = support(&start).coords;
@@ -66,6 +74,12 @@ fn searched_direction(mover: &Piece, still: &Piece) -> Vector3<f64> {
         }
     }
     best.1
+}
+
+/// A simplex of the difference of the two pieces, nearest to the origin.
+struct Simplex {
+    corners: [Point3<f64>; 4],
+    count: usize,
 }
 
 impl Simplex {
