@@ -1,7 +1,7 @@
 //! False positives and earliness of continuous collision detection against its gap, as CSV and a picture:
 //! `cargo run --release -p god-object --example collision_queries [DIRECTORY]`, `docs/pictures` when none is named.
 //!
-//! The query sets are judged by exact arithmetic, the motions of bunnies by the times of first contact in `bunny_contacts.csv`. No
+//! The query sets, as motions of rigid bodies, are judged by exact arithmetic, the motions of bunnies by the times of first contact in `bunny_contacts.csv`. No
 //! contact may be missed or late; how early it is found, and how many near misses count as contacts, is the price of the gap.
 //! Times are CPU time of the thread, the best of [`REPEATS`].
 #![allow(
@@ -63,6 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     let data = geometry_shapes::data_dir();
     let queries = query_sets(data.as_deref()).ok_or("the query sets are not there")?;
+    let queries: Vec<_> = queries.iter().map(Query::rigid).collect();
     let truths: Vec<_> = queries
         .iter()
         .map(|query| first_contact(query.kind, &query.start, &query.end))

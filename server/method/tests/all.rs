@@ -4,7 +4,6 @@
 use assert_no_alloc::AllocDisabler;
 
 mod collision_facing;
-mod collision_linear;
 mod collision_query_sets;
 mod collision_time_of_impact;
 mod contact_collection;
@@ -23,6 +22,7 @@ mod god_object_flat_landing;
 mod god_object_peg_in_hole;
 mod implicit_constraints;
 mod many_obstacles;
+mod mesh_distance;
 mod mesh_impact;
 mod moving_friction;
 mod moving_friction_variants;

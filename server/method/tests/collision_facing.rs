@@ -1,9 +1,10 @@
 //! Time of impact of spiky, hollow, thin and far meshes: what does not face is left out, and nothing is missed by it.
 
 use crate::geometry_shapes::{cuboid, grid_box, icosphere, mesh, peg, torus};
+use crate::mesh_distance::distance;
 use crate::mesh_impact::{SETTINGS, search, straight, vector};
 use god_object::collision::{
-    CollisionWorkspace, Motion, TimeOfImpact, Work, distance, meshes_intersect, time_of_impact,
+    CollisionWorkspace, Motion, TimeOfImpact, Work, meshes_intersect, time_of_impact,
 };
 use god_object::geometry::Mesh;
 use god_object::nalgebra::{Point3, Vector3};

@@ -3,10 +3,11 @@
 use crate::geometry_shapes;
 
 use crate::geometry_shapes::{cuboid, grid_box, hole, icosphere, mesh, peg, tetrahedron, torus};
+use crate::mesh_distance::distance;
 use crate::mesh_impact::{SETTINGS, search, straight, vector};
 use god_object::collision::{
-    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, distance,
-    meshes_intersect, time_of_impact,
+    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, meshes_intersect,
+    time_of_impact,
 };
 use god_object::geometry::Mesh;
 use god_object::nalgebra::{Point3, Vector3};

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use crate::geometry_shapes::{cuboid, grid_box, hole, icosphere, mesh, peg, tetrahedron, torus};
-use god_object::collision::{CollisionWorkspace, Work, distance, meshes_intersect};
+use crate::mesh_distance::distance;
+use god_object::collision::{CollisionWorkspace, Work, meshes_intersect};
 use god_object::constraint::{Collected, Contact, Feature, collect_contacts};
 use god_object::geometry::Mesh;
 use god_object::nalgebra::{Point3, Vector3};

@@ -1,7 +1,8 @@
 //! Closest points of triangles and distances of meshes, against certificates and brute force.
 
 use crate::geometry_shapes::{cuboid, icosphere, mesh, tetrahedron, torus};
-use god_object::collision::{distance, meshes_intersect};
+use crate::mesh_distance::distance;
+use god_object::collision::meshes_intersect;
 use god_object::geometry::distance::{
     closest_on_triangle, closest_on_triangles, triangles_intersect,
 };

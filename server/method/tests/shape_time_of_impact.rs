@@ -1,5 +1,6 @@
 //! Time of impact of primitives with each other and with meshes, against parry's distances.
 
+use crate::geometry_shapes::{icosphere, mesh};
 use crate::shape_support;
 
 use crate::shape_support::{Form, forms, obstacles, oracle_distance, vectors};
@@ -117,6 +118,37 @@ fn what_is_out_of_reach_costs_nothing() {
         );
         let expected = (TimeOfImpact::Separated, Work::default());
         assert_eq!((found, work), expected, "{form:?} and {obstacle:?}");
+    }
+}
+
+#[test]
+fn a_fine_mesh_on_a_large_ball_is_searched_near_the_contact_alone() {
+    let body = mesh(icosphere(0.05, 5));
+    // Aslant to all axes, where the box around the ball says nothing.
+    let up = Vector3::new(1.0, 1.0, 1.0).normalize();
+    let start = Pose::from_parts((up * 1.05002).into(), UnitQuaternion::identity());
+    let along = up.cross(&Vector3::z()) * 1e-4;
+    let ball = Form::Sphere(1.0).obstacle("ball", Pose::identity());
+    let (body, still) = (&body, &Pose::identity());
+    for (path, lands) in [(along, false), (along - up * 1e-4, true)] {
+        let motion = Motion {
+            start,
+            displacement: six(&path, &Vector3::new(1e-3, 0.0, 1e-3)),
+            reference_point: Point3::origin(),
+        };
+        let (workspace, mut work) = (&mut CollisionWorkspace::new(), Work::default());
+        let found = time_of_impact(body, &motion, &ball, still, &SETTINGS, workspace, &mut work);
+        assert_eq!(
+            matches!(found, TimeOfImpact::Impact { .. }),
+            lands,
+            "{found:?}"
+        );
+        // The cap of the mesh within the path and its turn, 0.2 mm, is 0.4 % of it: several times that, for volumes and whole triangles.
+        let most = body.triangles().len() as u64 / 50;
+        assert!(
+            work.triangle_pairs < most && work.node_pairs < most,
+            "{work:?}"
+        );
     }
 }
 

@@ -12,6 +12,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::beyond::Beyond;
+use super::buckets::Buckets;
 use super::descent::{AtRest, Opened, open};
 use super::facing_volumes::FacingVolumes;
 use super::turned::TurnedNodes;
@@ -26,75 +27,13 @@ pub(super) const BANDS: usize = 12;
 const CAPACITY: usize = 1 << 15;
 /// Share of a band's edge that single precision may have got wrong.
 const EDGE_ROUNDING: f64 = 1e-5;
-/// Marks the end of a list.
-const NONE: u32 = u32::MAX;
-
 /// Bands of a search by clearance: as many for what is violated, the deepest first.
 const SIGNED_BANDS: usize = 2 * BANDS;
 /// The band of what is left out.
 pub(super) const OUT_OF_QUESTION: u32 = SIGNED_BANDS as u32;
 
-/// Pairs that wait, by band; the last one of a band is the first out. No allocation after `new`.
-#[derive(Clone, Debug)]
-pub(crate) struct Bands {
-    heads: [u32; SIGNED_BANDS],
-    waiting: Vec<Waiting>,
-    free: u32,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Waiting {
-    pair: (Child, Child),
-    next: u32,
-}
-
-impl Bands {
-    pub(super) fn new() -> Self {
-        Self {
-            heads: [NONE; SIGNED_BANDS],
-            waiting: Vec::with_capacity(CAPACITY),
-            free: NONE,
-        }
-    }
-
-    fn clear(&mut self) {
-        self.heads = [NONE; SIGNED_BANDS];
-        self.waiting.clear();
-        self.free = NONE;
-    }
-
-    /// False when there is no room.
-    #[inline]
-    fn push(&mut self, band: usize, pair: (Child, Child)) -> bool {
-        let next = self.heads[band];
-        let place = if self.free != NONE {
-            let place = self.free;
-            self.free = self.waiting[place as usize].next;
-            self.waiting[place as usize] = Waiting { pair, next };
-            place
-        } else if self.waiting.len() < CAPACITY {
-            self.waiting.push(Waiting { pair, next });
-            self.waiting.len() as u32 - 1
-        } else {
-            return false;
-        };
-        self.heads[band] = place;
-        true
-    }
-
-    #[inline]
-    fn pop(&mut self, band: usize) -> Option<(Child, Child)> {
-        let place = self.heads[band];
-        if place == NONE {
-            return None;
-        }
-        let Waiting { pair, next } = self.waiting[place as usize];
-        self.heads[band] = next;
-        self.waiting[place as usize].next = self.free;
-        self.free = place;
-        Some(pair)
-    }
-}
+/// Pairs of volumes that wait, by band.
+pub(crate) type Bands = Buckets<(Child, Child), 1, CAPACITY>;
 
 /// The distance from which on band `band` begins, m: no more than that.
 fn edge(band: usize, margin: f64) -> f64 {
@@ -184,12 +123,7 @@ where
         let (body, obstacle) = trees;
         bands.clear();
         let mut room = bands.push(0, (ROOT, ROOT));
-        let mut band = 0;
-        while band < SIGNED_BANDS {
-            let Some((a, b)) = bands.pop(band) else {
-                band += 1;
-                continue;
-            };
+        while let Some((band, (a, b))) = bands.pop(SIGNED_BANDS) {
             // Not before its turn: most that wait never have one.
             if !wanted(body.owned(a), obstacle.owned(b)) {
                 continue;
@@ -238,26 +172,6 @@ impl Order for Nearest {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_waits_comes_out_by_band_and_places_are_used_again() {
-        let mut bands = Bands::new();
-        for round in 0..3 {
-            for k in 0..CAPACITY as u32 {
-                assert!(bands.push(k as usize % BANDS, (k, round)));
-            }
-            assert!(!bands.push(0, (0, 0)), "full");
-            for band in 0..BANDS {
-                let mut count = 0;
-                while let Some((k, r)) = bands.pop(band) {
-                    assert_eq!((k as usize % BANDS, r), (band, round));
-                    count += 1;
-                }
-                assert_eq!(count, (CAPACITY - band).div_ceil(BANDS));
-            }
-        }
-        assert_eq!(bands.waiting.len(), CAPACITY);
-    }
 
     #[test]
     fn bands_begin_at_touch_and_end_at_the_margin() {

@@ -85,10 +85,7 @@ impl Collider<'_> {
     /// Largest coordinate, m: rounding is relative to it. For a half-space, of its point.
     pub(super) fn reach(&self) -> f64 {
         match self {
-            Self::Mesh(mesh) => {
-                let corners = mesh.bounding_box();
-                corners.iter().map(|p| p.coords.amax()).fold(0.0, f64::max)
-            }
+            Self::Mesh(mesh) => mesh.reach(),
             Self::Primitive(Primitive::Plane { point, .. }) => point.coords.amax(),
             Self::Primitive(primitive) => primitive.radius_about(&Point3::origin()),
         }

@@ -6,6 +6,7 @@ use super::advancement::{PairSearch, PiecePair};
 use super::agenda::{Agenda, Part, Waiting};
 use super::collider::Collider;
 use super::descent::{AT_ONCE, InMotion, Opened, at_once, open};
+use super::facing_volumes::{FacingVolumes, Side};
 use super::impact::{AdvancementSettings, First};
 use super::intervals::{Interval, Intervals, WHOLE, halvings};
 use super::motion::RelativeMotion;
@@ -13,7 +14,8 @@ use super::turned::TurnedNodes;
 use super::windows::{Window, Windows};
 use super::work::Work;
 use super::workspace::CollisionWorkspace;
-use crate::geometry::wide_tree::{Below, ROOT, WideTree};
+use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
+use crate::shape::Primitive;
 
 /// When volumes come near is worked out where the body moves by more than this share of the larger one's radius in half an interval. Otherwise
 /// they count as near in all of the window of what they are in, which is the cheaper test.
@@ -42,6 +44,17 @@ impl Problem<'_> {
         }
     }
 
+    /// The primitive that a mesh is searched against, and whose the mesh is.
+    fn primitive(&self) -> Option<(&Primitive, Side)> {
+        match (&self.body, &self.obstacle) {
+            (Collider::Mesh(_), Collider::Primitive(primitive)) => Some((primitive, Side::Body)),
+            (Collider::Primitive(primitive), Collider::Mesh(_)) => {
+                Some((primitive, Side::Obstacle))
+            }
+            _ => None,
+        }
+    }
+
     /// The trees of both; `leaves` become those of primitives.
     pub(super) fn trees<'t>(
         &'t self,
@@ -57,6 +70,23 @@ impl Problem<'_> {
             self.obstacle.tree(obstacle, reached),
         )
     }
+}
+
+/// Whether the ball about the mesh's volume of a pair stays beyond a primitive in an interval: boxes say little of what is round.
+#[inline]
+fn stays_beyond(
+    (primitive, side): (&Primitive, Side),
+    volumes: &FacingVolumes,
+    trees: (&WideTree, &WideTree),
+    pair: (Child, Child),
+) -> bool {
+    let (tree, child, other) = match side {
+        Side::Body => (trees.0, pair.0, trees.1),
+        Side::Obstacle => (trees.1, pair.1, trees.0),
+    };
+    let at = other.origin + volumes.seen_by_other(side, &tree.center(child));
+    let reach = f64::from(tree.radius(child)) + volumes.longest_stray();
+    primitive.nearest(&at).distance > reach // false for NaN
 }
 
 /// A search for every pair of pieces that may face each other within the gap at some time before the first impact so far, with the vectors
@@ -81,7 +111,7 @@ struct Queue<'a> {
 impl Queue<'_> {
     #[inline(always)]
     fn push(&mut self, part: Part, waiting: Waiting) {
-        if part <= self.now || !self.agenda.push(part, waiting) {
+        if part <= self.now || !self.agenda.push(part.0 as usize, waiting) {
             self.stack.push(waiting);
         }
     }
@@ -90,8 +120,9 @@ impl Queue<'_> {
     #[inline(always)]
     fn pop(&mut self, nothing_under_way: bool) -> Option<Waiting> {
         self.stack.pop().or_else(|| {
-            let (part, next) = nothing_under_way.then(|| self.agenda.pop(self.last))??;
-            self.now = part;
+            let last = self.last.0 as usize;
+            let (part, next) = nothing_under_way.then(|| self.agenda.pop(last))??;
+            self.now = Part(part as u32);
             Some(next)
         })
     }
@@ -181,6 +212,7 @@ impl WithSimd for DescentInMotion<'_, '_> {
             ..
         } = workspace;
         let trees = problem.trees(leaves);
+        let primitive = problem.primitive();
         let memory = &memories[*current];
         intervals.restart(first.time, search.gaps.stop);
         let mut halving = Halving {
@@ -218,6 +250,9 @@ impl WithSimd for DescentInMotion<'_, '_> {
                 let to = to.min(first.time);
                 let later = from >= first.time || (first.is_near() && from > 0.0);
                 if (later && from > 0.0) || first.overlapping {
+                    continue;
+                }
+                if primitive.is_some_and(|p| stays_beyond(p, &interval.volumes, trees, (a, b))) {
                     continue;
                 }
                 if let (Below::Triangle(t), Below::Triangle(s)) =

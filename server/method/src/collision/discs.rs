@@ -14,11 +14,12 @@
 
 use nalgebra::Vector3;
 
-use super::advancement::{MovingPiece, PairSearch, PiecePair, SafeStep, support};
+use super::advancement::{PairSearch, PiecePair};
 use super::collider::{Disc, Swept};
 use super::fall::time_to_fall;
 use super::gjk::{Core, direction};
 use super::motion::Placement;
+use super::moving_piece::{MovingPiece, SafeStep, support};
 
 /// A step along the normals of faces and caps that covers this share of what is left is taken without a look at closest points.
 const GOOD_SHARE: f64 = 0.25;

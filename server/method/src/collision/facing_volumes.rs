@@ -220,6 +220,17 @@ impl FacingVolumes {
         (&body.own_half_path, &body.own_half_turn, body.angle)
     }
 
+    /// A point of one tree, from its origin, in the middle of the interval: from the origin of the other tree and in its axes, m.
+    pub(super) fn seen_by_other(&self, side: Side, point: &Vector3<f64>) -> Vector3<f64> {
+        let frame = self.frame(side);
+        frame.turn * point + frame.offset
+    }
+
+    /// How far any point of the body may be from there in the interval, with the margin and rounding, m.
+    pub(super) fn longest_stray(&self) -> f64 {
+        f64::from(self.longest_half_sweep) + f64::from(self.stray)
+    }
+
     /// Whether points of the body may move by more than `length` (m) in half the interval.
     #[inline]
     pub(crate) fn sweeps_more_than(&self, length: f32) -> bool {

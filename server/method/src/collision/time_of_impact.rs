@@ -16,7 +16,7 @@
 //! Surfaces that cross at the start have no such pair; crossing is looked for first, wherever no search before has
 //! shown that they are apart. Primitives are solids with normals all ways: what crosses them is near them.
 //!
-//! **Never late.** Every bound is one-sided in exact arithmetic ([`advancement`](super), [`still_box`](super)). In floating
+//! **Never late.** Every bound is one-sided in exact arithmetic ([`advancement`](super), [`facing_volumes`](super)). In floating
 //! point the coordinates of both bodies are off by some units in the last place of the largest coordinate on the way
 //! from the poses to a distance: at most about forty roundings, each of half a unit. `slack`, 256 units, is added to the minimum gap,
 //! which so holds on the poses that the caller computes by itself.

@@ -9,6 +9,7 @@ use super::intervals::{Intervals, MAX_HALVINGS};
 use super::known_apart::KnownApart;
 use super::turned::TurnedNodes;
 use crate::constraint::Contact;
+use crate::geometry::MAX_DEPTH;
 use crate::geometry::wide_tree::WideTree;
 
 /// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
@@ -61,6 +62,8 @@ impl Memory {
 #[derive(Clone, Debug)]
 pub struct CollisionWorkspace {
     pub(crate) pairs: Vec<(u32, u32)>,
+    /// Nodes of one tree that wait.
+    pub(crate) nodes: Vec<u32>,
     pub(crate) bands: Bands,
     pub(super) agenda: Agenda,
     /// Pairs that found no room on the agenda, and what lies below them.
@@ -94,8 +97,9 @@ impl CollisionWorkspace {
     pub fn with_candidates(candidates: usize) -> Self {
         Self {
             pairs: Vec::with_capacity(WIDE_STACK_CAPACITY),
-            bands: Bands::new(),
-            agenda: Agenda::new(),
+            nodes: Vec::with_capacity(MAX_DEPTH + 2),
+            bands: Bands::new(Default::default()),
+            agenda: Agenda::new(Waiting::UNUSED),
             // Each pair opened may have been cut into its shortest interval before.
             stack: Vec::with_capacity(WIDE_STACK_CAPACITY + (AT_ONCE + 1) * MAX_HALVINGS as usize),
             intervals: Intervals::new(),

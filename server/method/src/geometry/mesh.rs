@@ -26,7 +26,6 @@ pub struct Mesh {
     wide_tree: WideTree,
     identity: u64,
     bounding_box: [Point3<f64>; 2],
-    mean_edge_length: f64,
 }
 
 impl Mesh {
@@ -55,11 +54,6 @@ impl Mesh {
         for v in &vertices {
             bounding_box = [bounding_box[0].inf(v), bounding_box[1].sup(v)];
         }
-        let lengths = topology
-            .edges
-            .iter()
-            .map(|e| (vertices[e.vertices[1] as usize] - vertices[e.vertices[0] as usize]).norm());
-        let mean_edge_length = lengths.sum::<f64>() / topology.edges.len() as f64;
         Ok(Self {
             vertices,
             triangles,
@@ -69,7 +63,6 @@ impl Mesh {
             wide_tree,
             identity,
             bounding_box,
-            mean_edge_length,
         })
     }
 
@@ -155,9 +148,10 @@ impl Mesh {
         self.bounding_box
     }
 
-    /// Mean length of the edges, m.
-    pub fn mean_edge_length(&self) -> f64 {
-        self.mean_edge_length
+    /// Largest coordinate of the bounding box, m: rounding is relative to it.
+    pub(crate) fn reach(&self) -> f64 {
+        let [low, high] = &self.bounding_box;
+        low.coords.amax().max(high.coords.amax())
     }
 
     /// Bound on the distance of any vertex from `point`, m, by the bounding box: no vertex is visited.

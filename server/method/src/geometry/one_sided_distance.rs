@@ -54,11 +54,7 @@ pub fn one_sided_distance(
     limit: f64,
     mut done: impl FnMut(usize),
 ) -> OneSidedDistance {
-    let reach = |mesh: &Mesh| {
-        let corners = mesh.bounding_box();
-        corners.iter().map(|p| p.coords.amax()).fold(0.0, f64::max)
-    };
-    let rounding = ROUNDING * (reach(from) + reach(to));
+    let rounding = ROUNDING * (from.reach() + to.reach());
     let mut search = OneSided {
         to,
         limit,

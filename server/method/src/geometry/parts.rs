@@ -51,6 +51,18 @@ struct Part {
     volume: f64,
 }
 
+impl Part {
+    /// The finding that it does, with its signed volume, m^3.
+    fn looking_wrong(&self, volume: f64) -> InvertedPart {
+        InvertedPart {
+            triangle: self.triangles[0],
+            triangles: self.triangles.len(),
+            center: nalgebra::center(&self.low, &self.high),
+            volume,
+        }
+    }
+}
+
 /// The parts of a closed surface whose triangles agree about outside within each part, in the order of their first triangles.
 /// `adjacent` names the two triangles of each edge. Which way a part looks has no influence on the depths.
 pub fn closed_parts(
@@ -58,10 +70,7 @@ pub fn closed_parts(
     triangles: &[[u32; 3]],
     adjacent: impl Iterator<Item = [u32; 2]>,
 ) -> Vec<ClosedPart> {
-    let parts: Vec<Part> = connected(triangles.len(), adjacent)
-        .into_iter()
-        .map(|inside| measure(vertices, triangles, inside))
-        .collect();
+    let parts = parts_of(vertices, triangles, adjacent);
     let depth = |own: &Part| {
         let around =
             |other: &&Part| !std::ptr::eq(*other, own) && encloses(vertices, triangles, other, own);
@@ -130,10 +139,7 @@ pub(super) fn wrong_parts(
     borders: &[([u32; 2], u32)],
     unclear: &[u32],
 ) -> WrongParts {
-    let parts: Vec<Part> = connected(triangles.len(), adjacent)
-        .into_iter()
-        .map(|inside| measure(vertices, triangles, inside))
-        .collect();
+    let parts = parts_of(vertices, triangles, adjacent);
     let mut part_of = vec![0; triangles.len()];
     for (index, part) in parts.iter().enumerate() {
         part.triangles
@@ -163,12 +169,7 @@ pub(super) fn wrong_parts(
                 .filter(|(other, part)| *other != index && around(part))
                 .count()
         };
-        let found = InvertedPart {
-            triangle: part.triangles[0],
-            triangles: part.triangles.len(),
-            center: nalgebra::center(&part.low, &part.high),
-            volume,
-        };
+        let found = part.looking_wrong(volume);
         let outward = volume > 0.0; // false for NaN
         let free = || {
             let mut samples = sample_points(vertices, triangles, part);
@@ -219,10 +220,7 @@ pub(super) fn inverted_parts(
     triangles: &[[u32; 3]],
     adjacent: impl Iterator<Item = [u32; 2]>,
 ) -> Vec<InvertedPart> {
-    let parts: Vec<Part> = connected(triangles.len(), adjacent)
-        .into_iter()
-        .map(|inside| measure(vertices, triangles, inside))
-        .collect();
+    let parts = parts_of(vertices, triangles, adjacent);
     let inverted = |index: usize| {
         let part = &parts[index];
         let outward = part.volume > 0.0; // false for NaN
@@ -233,12 +231,7 @@ pub(super) fn inverted_parts(
     };
     (0..parts.len())
         .filter(|index| inverted(*index))
-        .map(|index| InvertedPart {
-            triangle: parts[index].triangles[0],
-            triangles: parts[index].triangles.len(),
-            center: nalgebra::center(&parts[index].low, &parts[index].high),
-            volume: parts[index].volume,
-        })
+        .map(|index| parts[index].looking_wrong(parts[index].volume))
         .collect()
 }
 
@@ -282,6 +275,17 @@ fn root(parent: &mut [u32], mut t: u32) -> u32 {
         t = parent[t as usize];
     }
     t
+}
+
+fn parts_of(
+    vertices: &[Point3<f64>],
+    triangles: &[[u32; 3]],
+    adjacent: impl Iterator<Item = [u32; 2]>,
+) -> Vec<Part> {
+    let parts = connected(triangles.len(), adjacent).into_iter();
+    parts
+        .map(|inside| measure(vertices, triangles, inside))
+        .collect()
 }
 
 fn measure(vertices: &[Point3<f64>], triangles: &[[u32; 3]], inside: Vec<u32>) -> Part {

@@ -6,6 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::mesh::{face_normal, signed_volume};
 use super::parts::{InvertedPart, wrong_parts};
+use super::topology::sorted_sides;
 
 /// Findings about vertices and triangles as they come from a file. Works for meshes that [`Mesh`](super::Mesh) refuses.
 #[derive(Clone, Debug, PartialEq)]
@@ -151,30 +152,24 @@ struct Sides {
 
 /// What the edges are like.
 fn count_sides(triangles: &[[u32; 3]]) -> Sides {
-    let mut all: Vec<(u32, u32, bool, u32)> = triangles
-        .iter()
-        .zip(0..)
-        .flat_map(|(t, index)| (0..3).map(move |k| (t[k], t[(k + 1) % 3], index)))
-        .map(|(from, to, index)| (from.min(to), from.max(to), from < to, index))
-        .collect();
-    all.sort_unstable();
+    let all = sorted_sides(triangles);
     let mut sides = Sides::default();
-    for edge in all.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let ends = [edge[0].0, edge[0].1];
-        match *edge {
-            [one] => sides.borders.push((ends, one.3)),
+    for edge in all.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high)) {
+        let ends = [edge[0].low, edge[0].high];
+        match edge {
+            [one] => sides.borders.push((ends, one.triangle)),
             [a, b] => {
-                if a.2 == b.2 {
+                if a.forward == b.forward {
                     sides.misoriented += 1;
                     sides.first_misoriented.get_or_insert(ends);
-                    sides.unclear.extend([a.3, b.3]);
+                    sides.unclear.extend([a.triangle, b.triangle]);
                 }
-                sides.adjacent.push([a.3, b.3]);
+                sides.adjacent.push([a.triangle, b.triangle]);
             }
             _ => {
                 sides.crowded += 1;
                 sides.first_crowded.get_or_insert(ends);
-                sides.unclear.extend(edge.iter().map(|side| side.3));
+                sides.unclear.extend(edge.iter().map(|side| side.triangle));
             }
         }
     }

@@ -14,6 +14,7 @@ use nalgebra::{Point3, Vector3};
 use super::mesh::Mesh;
 use super::parts::surface_windings;
 use super::self_intersection::self_intersections;
+use super::tree::Node;
 
 /// A ray that passes a face nearer to its border than this share of the face may count it twice or never: another one is taken.
 const BORDER: f64 = 1e-9;
@@ -111,8 +112,7 @@ fn inverted_at(mesh: &Mesh, pair: [u32; 2], stack: &mut Vec<u32>) -> Option<Poin
     let first = ends.next()?;
     let far = |p: &Point3<f64>| (p - first).norm_squared();
     let last = ends.max_by(|p, q| far(p).total_cmp(&far(q)))?;
-    let reach = mesh.bounding_box().map(|p| p.coords.amax());
-    let rounding = ROUNDING * reach[0].max(reach[1]);
+    let rounding = ROUNDING * mesh.reach();
     let along = (last - first)
         .try_normalize(rounding)
         .filter(|_| far(&last) > 0.0)?; // they touch in a point
@@ -149,30 +149,24 @@ fn windings_along(
     rounding: f64,
     stack: &mut Vec<u32>,
 ) -> Option<(i32, f64)> {
-    let nodes = mesh.tree().nodes();
-    let (mut windings, mut nearest) = (0, f64::INFINITY);
-    stack.clear();
-    stack.push(0);
-    while let Some(i) = stack.pop() {
-        let node = &nodes[i as usize];
-        if !passes_box(from, way, &node.center, &node.half) {
-            continue;
+    let (mut windings, mut nearest, mut unclear) = (0, f64::INFINITY, false);
+    let passes = |node: &Node| passes_box(from, way, &node.center, &node.half);
+    mesh.tree().for_triangles(stack, passes, |t| {
+        if but.contains(&t) {
+            return true;
         }
-        if !node.is_leaf() {
-            stack.extend([node.second, i + 1]);
-        } else if !but.contains(&node.triangle) {
-            let normal = mesh.face_normal(node.triangle);
-            match passes_triangle(from, way, &mesh.corners(node.triangle), normal, rounding) {
-                Pass::Beside => {}
-                Pass::Unclear => return None,
-                Pass::Through(distance) => {
-                    windings += if normal.dot(way) > 0.0 { 1 } else { -1 };
-                    nearest = nearest.min(distance);
-                }
+        let normal = mesh.face_normal(t);
+        match passes_triangle(from, way, &mesh.corners(t), normal, rounding) {
+            Pass::Beside => {}
+            Pass::Unclear => unclear = true,
+            Pass::Through(distance) => {
+                windings += if normal.dot(way) > 0.0 { 1 } else { -1 };
+                nearest = nearest.min(distance);
             }
         }
-    }
-    Some((windings, nearest))
+        !unclear
+    });
+    (!unclear).then_some((windings, nearest))
 }
 
 fn passes_box(

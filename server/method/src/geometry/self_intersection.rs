@@ -6,6 +6,7 @@ use nalgebra::Point3;
 
 use super::distance::triangles_intersect;
 use super::mesh::Mesh;
+use super::tree::Node;
 
 /// Faces on the same side of their common edge lie on each other if the cosine between them is above this.
 const FOLDED: f64 = 1.0 - 1e-12;
@@ -50,27 +51,23 @@ fn partners(
     stack: &mut Vec<u32>,
     visit: &mut impl FnMut([u32; 2]) -> ControlFlow<()>,
 ) -> ControlFlow<()> {
-    let nodes = mesh.tree().nodes();
     let corners = mesh.corners(a);
     let (low, high) = (
         corners[0].inf(&corners[1]).inf(&corners[2]),
         corners[0].sup(&corners[1]).sup(&corners[2]),
     );
-    stack.clear();
-    stack.push(0);
-    while let Some(i) = stack.pop() {
-        let node = &nodes[i as usize];
+    let near = |node: &Node| {
         let (from, to) = (node.center - node.half, node.center + node.half);
-        if (0..3).any(|k| from[k] > high[k] || to[k] < low[k]) {
-            continue;
+        !(0..3).any(|k| from[k] > high[k] || to[k] < low[k])
+    };
+    let mut flow = ControlFlow::Continue(());
+    mesh.tree().for_triangles(stack, near, |b| {
+        if b > a && meet_elsewhere(mesh, a, b) {
+            flow = visit([a, b]);
         }
-        if !node.is_leaf() {
-            stack.extend([node.second, i + 1]);
-        } else if node.triangle > a && meet_elsewhere(mesh, a, node.triangle) {
-            visit([a, node.triangle])?;
-        }
-    }
-    ControlFlow::Continue(())
+        flow.is_continue()
+    });
+    flow
 }
 
 fn meet_elsewhere(mesh: &Mesh, a: u32, b: u32) -> bool {

@@ -54,12 +54,12 @@ pub(crate) struct Topology {
 
 /// One directed side of a triangle.
 #[derive(Clone, Copy)]
-struct Side {
-    low: u32,
-    high: u32,
-    triangle: u32,
+pub(super) struct Side {
+    pub(super) low: u32,
+    pub(super) high: u32,
+    pub(super) triangle: u32,
     corner: u32,
-    forward: bool,
+    pub(super) forward: bool,
 }
 
 impl Topology {
@@ -116,7 +116,8 @@ impl Topology {
     }
 }
 
-fn sorted_sides(triangles: &[[u32; 3]]) -> Vec<Side> {
+/// The sides of all triangles, those of one edge next to each other.
+pub(super) fn sorted_sides(triangles: &[[u32; 3]]) -> Vec<Side> {
     let mut sides = Vec::with_capacity(3 * triangles.len());
     for (triangle, corners) in triangles.iter().enumerate() {
         for corner in 0..3 {

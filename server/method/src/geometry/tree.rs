@@ -71,6 +71,28 @@ impl Tree {
         Self { nodes }
     }
 
+    /// Calls `visit` for every triangle whose boxes `keep` accepts all the way down; stops when it returns false. `stack` is scratch memory.
+    pub(crate) fn for_triangles(
+        &self,
+        stack: &mut Vec<u32>,
+        mut keep: impl FnMut(&Node) -> bool,
+        mut visit: impl FnMut(u32) -> bool,
+    ) {
+        stack.clear();
+        stack.push(0);
+        while let Some(i) = stack.pop() {
+            let node = &self.nodes[i as usize];
+            if !keep(node) {
+                continue;
+            }
+            if !node.is_leaf() {
+                stack.extend([node.second, i + 1]);
+            } else if !visit(node.triangle) {
+                return;
+            }
+        }
+    }
+
     /// All nodes, the root first.
     #[inline]
     pub fn nodes(&self) -> &[Node] {

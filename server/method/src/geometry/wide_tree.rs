@@ -177,6 +177,14 @@ impl WideTree {
         self.entries[child as usize].radius
     }
 
+    /// Centre of a child's ball from the tree's origin, m.
+    #[inline]
+    pub(crate) fn center(&self, child: Child) -> Vector3<f64> {
+        let (node, lane) = (self.node(child / LANES as u32), child as usize % LANES);
+        let coordinate = |i: usize| f64::from(node.origin[i]) + f64::from(node.center[i].0[lane]);
+        Vector3::new(coordinate(0), coordinate(1), coordinate(2))
+    }
+
     /// What tells which of two volumes is to be opened: the thicker one, m; of flat ones, the larger.
     #[inline]
     pub(crate) fn thickness(&self, child: Child) -> f32 {

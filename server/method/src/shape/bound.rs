@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::Primitive;
 use crate::collision::Placement;
-use crate::geometry::{Mesh, Node};
+use crate::geometry::Node;
 
 /// Tests boxes of a mesh against a primitive.
 #[derive(Clone, Copy, Debug)]
@@ -52,33 +52,5 @@ impl<'a> Bound<'a> {
             + in_mesh.z.abs() * node.half.z;
         let apart = nearest.distance > extent + self.margin; // false for NaN
         !apart
-    }
-}
-
-/// Calls `visit` for every triangle of the mesh whose boxes `keep` accepts all the way down; stops when it returns false.
-///
-/// `keep` is asked with a node's index. `stack` is scratch memory of pairs; only the first is used.
-pub(super) fn for_triangles(
-    mesh: &Mesh,
-    stack: &mut Vec<(u32, u32)>,
-    mut keep: impl FnMut(u32) -> bool,
-    mut visit: impl FnMut(u32) -> bool,
-) {
-    let nodes = mesh.tree().nodes();
-    stack.clear();
-    stack.push((0, 0));
-    while let Some((i, _)) = stack.pop() {
-        if !keep(i) {
-            continue;
-        }
-        let node = &nodes[i as usize];
-        if node.is_leaf() {
-            if !visit(node.triangle) {
-                return;
-            }
-        } else {
-            stack.push((node.second, 0));
-            stack.push((i + 1, 0));
-        }
     }
 }

@@ -4,14 +4,15 @@
 //! and edge belongs to one triangle, so that a pair of features is looked at once.
 
 use super::Primitive;
-use super::bound::{Bound, for_triangles};
+use super::bound::Bound;
 use super::element::{Row, weights};
 use super::implied::ImpliedRows;
 use super::touching::{Touching, primitive_pair, rows_of_triangle};
 use crate::collision::{CollisionWorkspace, MAX_CANDIDATES, Placement, Work};
-use crate::constraint::{Collected, Contact, FeaturePair, Nearest, in_world};
+use crate::constraint::{Collected, Contact, FeaturePair, Nearest, collect_contacts, in_world};
 use crate::geometry::Mesh;
 use crate::spatial::Pose;
+use crate::world::{Body, Obstacle};
 
 /// The triangle of a contact on a primitive: none.
 const NO_TRIANGLE: u32 = u32::MAX;
@@ -48,6 +49,24 @@ impl Sink<'_> {
             barycentric,
         });
     }
+
+    /// Appends the nearest that were taken, of the frame that is at `frame`, to `out`.
+    fn hand_out(mut self, frame: &Pose, looked_at: u64, out: &mut Vec<Contact>) -> Collected {
+        self.nearest.finish();
+        let truncated = self.nearest.truncated;
+        let candidates = &*self.nearest.candidates;
+        out.extend(candidates.iter().map(|c| in_world(c, frame)));
+        let complete_within = match candidates.last() {
+            Some(farthest) if truncated => farthest.gap,
+            _ => self.activation_distance,
+        };
+        Collected {
+            truncated,
+            gap_min: candidates.first().map_or(f64::INFINITY, |c| c.gap),
+            complete_within,
+            looked_at,
+        }
+    }
 }
 
 /// A mesh and a primitive, and which of them is the body.
@@ -57,21 +76,16 @@ struct MeshSide<'a> {
     primitive: &'a Primitive,
 }
 
-/// What is collected: two primitives, or one and a mesh.
-pub(super) enum Pairing<'a> {
-    Primitives(&'a Primitive, &'a Primitive),
-    BodyPrimitive(&'a Primitive, &'a Mesh),
-    BodyMesh(&'a Mesh, &'a Primitive),
-}
-
-/// Appends every contact within `activation_distance` to `out`, nearest first, as many as its capacity has room for. No allocation.
+/// [`collect_contacts`] for any shapes: appends every contact within `activation_distance` (m) to `out`, nearest first, as many as its capacity has room
+/// for. No allocation.
 #[allow(
     clippy::too_many_arguments,
-    reason = "two placed forms, a distance, and memory to work in"
+    reason = "two placed shapes, a distance, and memory to work in"
 )]
-pub(super) fn collect(
-    pairing: &Pairing<'_>,
+pub fn collect(
+    body: &Body,
     body_pose: &Pose,
+    obstacle: &Obstacle,
     obstacle_pose: &Pose,
     obstacle_index: u16,
     activation_distance: f64,
@@ -79,6 +93,20 @@ pub(super) fn collect(
     out: &mut Vec<Contact>,
     work: &mut Work,
 ) -> Collected {
+    let primitives = (&body.primitive, &obstacle.primitive);
+    if let (None, None) = primitives {
+        return collect_contacts(
+            &body.mesh,
+            body_pose,
+            &obstacle.mesh,
+            obstacle_pose,
+            obstacle_index,
+            activation_distance,
+            workspace,
+            out,
+            work,
+        );
+    }
     let placement = Placement::of(body_pose, obstacle_pose);
     let looked = |work: &Work| work.triangle_pairs + work.feature_pairs;
     let looked_before = looked(work);
@@ -94,50 +122,33 @@ pub(super) fn collect(
         activation_distance,
         obstacle: obstacle_index,
     };
-    let frame = match *pairing {
-        Pairing::Primitives(body, obstacle) => {
-            let body = Touching::of(body, Some(&placement), false);
-            let obstacle = Touching::of(obstacle, None, false);
+    let mut with_mesh = |mesh, mesh_moves, primitive| {
+        let side = MeshSide {
+            mesh,
+            mesh_moves,
+            primitive,
+        };
+        side.collect(&placement, &mut sink, &mut workspace.nodes, work);
+    };
+    let mut frame = obstacle_pose;
+    match primitives {
+        (None, None) => {}
+        (Some(on_body), None) => with_mesh(&obstacle.mesh, false, on_body),
+        (None, Some(on_obstacle)) => {
+            with_mesh(&body.mesh, true, on_obstacle);
+            frame = body_pose;
+        }
+        (Some(on_body), Some(on_obstacle)) => {
+            let on_body = Touching::of(on_body, Some(&placement), false);
+            let on_obstacle = Touching::of(on_obstacle, None, false);
             work.feature_pairs += 1;
-            primitive_pair(&body, &obstacle, activation_distance, &mut |row| {
+            primitive_pair(&on_body, &on_obstacle, activation_distance, &mut |row| {
                 sink.take(&row, None)
             });
-            obstacle_pose
         }
-        Pairing::BodyPrimitive(primitive, mesh) => {
-            let side = MeshSide {
-                mesh,
-                mesh_moves: false,
-                primitive,
-            };
-            side.collect(&placement, &mut sink, &mut workspace.pairs, work);
-            obstacle_pose
-        }
-        Pairing::BodyMesh(mesh, primitive) => {
-            let side = MeshSide {
-                mesh,
-                mesh_moves: true,
-                primitive,
-            };
-            side.collect(&placement, &mut sink, &mut workspace.pairs, work);
-            body_pose
-        }
-    };
-    sink.nearest.finish();
-    let truncated = sink.nearest.truncated;
-    let candidates = &workspace.candidates;
-    let gap_min = candidates.first().map_or(f64::INFINITY, |c| c.gap);
-    out.extend(candidates.iter().map(|c| in_world(c, frame)));
-    let complete_within = match candidates.last() {
-        Some(farthest) if truncated => farthest.gap,
-        _ => activation_distance,
-    };
-    Collected {
-        truncated,
-        gap_min,
-        complete_within,
-        looked_at: looked(work) - looked_before,
     }
+    let looked_at = looked(work) - looked_before;
+    sink.hand_out(frame, looked_at, out)
 }
 
 impl MeshSide<'_> {
@@ -145,7 +156,7 @@ impl MeshSide<'_> {
         &self,
         placement: &Placement,
         sink: &mut Sink<'_>,
-        stack: &mut Vec<(u32, u32)>,
+        stack: &mut Vec<u32>,
         work: &mut Work,
     ) {
         let touching = Touching::of(self.primitive, Some(placement), self.mesh_moves);
@@ -156,7 +167,6 @@ impl MeshSide<'_> {
             sink.activation_distance,
         );
         let activation_distance = sink.activation_distance;
-        let nodes = self.mesh.tree().nodes();
         let (mut node_pairs, mut triangles) = (0, 0);
         let mut implied = ImpliedRows::new(activation_distance);
         // Rows have the primitive first.
@@ -167,12 +177,11 @@ impl MeshSide<'_> {
                 sink.take(row, Some((self.mesh, t)));
             }
         };
-        for_triangles(
-            self.mesh,
+        self.mesh.tree().for_triangles(
             stack,
-            |i| {
+            |node| {
                 node_pairs += 1;
-                bound.may_meet(&nodes[i as usize])
+                bound.may_meet(node)
             },
             |t| {
                 triangles += 1;

@@ -12,7 +12,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::element::{Knob, Rod, Row, crossing};
+use super::element::{Cone, Knob, Rod, Row, Skin};
 use super::primitive::{across, unit_axis};
 use super::rim::nearest_to_line;
 use crate::constraint::{Feature, LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_over};
@@ -94,41 +94,27 @@ impl Cylinder {
             )
         };
         let normal = -outward;
-        let facing = b.cone.holds(&normal, tilt); // the cylinder's own cone holds by construction
+        let facing = b.skin.cone.holds(&normal, tilt); // the cylinder's own cone holds by construction
         facing.then(|| {
             Row::between(
-                [feature, b.feature],
+                [feature, b.skin.feature],
                 [on_cylinder, b.at],
-                [0.0, b.round],
+                [0.0, b.skin.round],
                 normal,
             )
         })
     }
 
-    /// A segment across the side.
-    pub(super) fn rod_on_side(&self, b: &Rod) -> Option<Row> {
-        let (u, v) = (self.axis * self.length, b.ends[1] - b.ends[0]);
-        let (s, t) = crossing(&u, &v, &(self.ends[0] - b.ends[0]))?;
-        let inside = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
-        if !inside {
-            return None;
+    /// The side as a rod: the axis with the radius around it.
+    pub(super) fn side(&self) -> Rod<'static> {
+        Rod {
+            ends: self.ends,
+            skin: Skin {
+                round: self.radius,
+                cone: Cone::Any,
+                feature: Feature::Side,
+            },
         }
-        let (x, y) = (self.ends[0] + u * s, b.ends[0] + v * t);
-        let cross = u.cross(&v);
-        let unit = cross / cross.norm();
-        let normal = if unit.dot(&(x - y)) < 0.0 {
-            -unit
-        } else {
-            unit
-        };
-        b.cone.holds(&normal, LOOK_AHEAD_TILT).then(|| {
-            Row::between(
-                [Feature::Side, b.feature],
-                [x, y],
-                [self.radius, b.round],
-                normal,
-            )
-        })
     }
 
     /// A segment across the rims: where each is nearest to it.
@@ -157,13 +143,13 @@ impl Cylinder {
                     };
                     let facing = -normal.dot(&rim.radial) >= -LOOK_AHEAD_TILT
                         && -normal.dot(&outward) >= -LOOK_AHEAD_TILT
-                        && b.cone.holds(&normal, LOOK_AHEAD_TILT);
+                        && b.skin.cone.holds(&normal, LOOK_AHEAD_TILT);
                     if facing {
                         let place = CROSSINGS + u8::from(rim.upper);
                         found(Row::between(
-                            [Feature::Rim(end as u8, place), b.feature],
+                            [Feature::Rim(end as u8, place), b.skin.feature],
                             [rim.at, on_rod],
-                            [0.0, b.round],
+                            [0.0, b.skin.round],
                             normal,
                         ));
                     }

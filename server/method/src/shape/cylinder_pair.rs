@@ -6,7 +6,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::cylinder::{CROSSINGS, Cylinder};
-use super::element::{Cone, Rod, Row};
+use super::element::{Row, rod_rod};
 use crate::collision::{Core, Disc, direction};
 use crate::constraint::{Feature, LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE};
 
@@ -24,12 +24,12 @@ pub(super) fn cylinder_cylinder(
     reach: f64,
     mut found: impl FnMut(Row),
 ) {
-    if let Some(row) = a.rod_on_side(&a_side(b)) {
+    if let Some(row) = rod_rod(&a.side(), &b.side()) {
         found(row);
     }
     let parallel = a.axis.cross(&b.axis).norm() <= LOOK_AHEAD_TILT;
-    a.rod_on_rims(&a_side(b), &mut found);
-    b.rod_on_rims(&a_side(a), |row| found(row.reversed()));
+    a.rod_on_rims(&b.side(), &mut found);
+    b.rod_on_rims(&a.side(), |row| found(row.reversed()));
     for end in 0..2 {
         rims_over_cap(a, b, end, &mut found);
         rims_over_cap(b, a, end, |row| found(row.reversed()));
@@ -38,16 +38,6 @@ pub(super) fn cylinder_cylinder(
         overlapping_caps(a, b, &mut found);
     }
     rim_on_rim(a, b, reach, found);
-}
-
-/// The side as a rod: its axis with the radius around it.
-fn a_side(c: &Cylinder) -> Rod<'static> {
-    Rod {
-        ends: c.ends,
-        round: c.radius,
-        cone: Cone::Any,
-        feature: Feature::Side,
-    }
 }
 
 /// Rim points of `a` over the cap `end` of `b`.

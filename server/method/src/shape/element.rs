@@ -47,22 +47,42 @@ impl Cone<'_> {
     }
 }
 
+/// What a point or a segment is besides its place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Skin<'a> {
+    /// Radius of the ball swept over it, m.
+    pub(super) round: f64,
+    pub(super) cone: Cone<'a>,
+    pub(super) feature: Feature,
+}
+
 /// A point with a ball around it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Knob<'a> {
     pub(super) at: Point3<f64>,
-    pub(super) round: f64,
-    pub(super) cone: Cone<'a>,
-    pub(super) feature: Feature,
+    pub(super) skin: Skin<'a>,
 }
 
 /// A segment with a ball swept over it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rod<'a> {
     pub(super) ends: [Point3<f64>; 2],
-    pub(super) round: f64,
-    pub(super) cone: Cone<'a>,
-    pub(super) feature: Feature,
+    pub(super) skin: Skin<'a>,
+}
+
+impl Skin<'_> {
+    /// The row of points `x` of this and `y` of the other along `normal`, where that lies in both cones to the tilts, rad.
+    fn row(
+        &self,
+        other: &Self,
+        [x, y]: [Point3<f64>; 2],
+        normal: Vector3<f64>,
+        tilts: [f64; 2],
+    ) -> Option<Row> {
+        let facing = self.cone.holds(&-normal, tilts[0]) && other.cone.holds(&normal, tilts[1]);
+        let features = [self.feature, other.feature];
+        facing.then(|| Row::between(features, [x, y], [self.round, other.round], normal))
+    }
 }
 
 /// What becomes a contact. In the common frame.
@@ -108,16 +128,8 @@ impl Row {
 /// Two points.
 pub(super) fn knob_knob(a: &Knob, b: &Knob) -> Option<Row> {
     let normal = (a.at - b.at).try_normalize(f64::MIN_POSITIVE)?;
-    let facing = a.cone.holds(&-normal, NORMAL_CONE_TOLERANCE)
-        && b.cone.holds(&normal, NORMAL_CONE_TOLERANCE);
-    facing.then(|| {
-        Row::between(
-            [a.feature, b.feature],
-            [a.at, b.at],
-            [a.round, b.round],
-            normal,
-        )
-    })
+    let tilts = [NORMAL_CONE_TOLERANCE; 2];
+    a.skin.row(&b.skin, [a.at, b.at], normal, tilts)
 }
 
 /// A point over the inside of a segment. Points are let in before the body tilts onto them.
@@ -129,16 +141,8 @@ pub(super) fn knob_rod(a: &Knob, b: &Rod) -> Option<Row> {
     }
     let foot = b.ends[0] + along * share;
     let normal = (a.at - foot).try_normalize(f64::MIN_POSITIVE)?;
-    let facing =
-        a.cone.holds(&-normal, LOOK_AHEAD_TILT) && b.cone.holds(&normal, NORMAL_CONE_TOLERANCE);
-    facing.then(|| {
-        Row::between(
-            [a.feature, b.feature],
-            [a.at, foot],
-            [a.round, b.round],
-            normal,
-        )
-    })
+    let tilts = [LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE];
+    a.skin.row(&b.skin, [a.at, foot], normal, tilts)
 }
 
 /// Two segments that cross.
@@ -161,12 +165,11 @@ pub(super) fn rod_rod(a: &Rod, b: &Rod) -> Option<Row> {
     } else {
         unit
     };
-    let facing = a.cone.holds(&-normal, LOOK_AHEAD_TILT) && b.cone.holds(&normal, LOOK_AHEAD_TILT);
-    facing.then(|| Row::between([a.feature, b.feature], [x, y], [a.round, b.round], normal))
+    a.skin.row(&b.skin, [x, y], normal, [LOOK_AHEAD_TILT; 2])
 }
 
 /// Fractions along two lines, `u` and `v` from points `r` apart, where they are nearest; `None` when they are parallel.
-pub(super) fn crossing(u: &Vector3<f64>, v: &Vector3<f64>, r: &Vector3<f64>) -> Option<(f64, f64)> {
+fn crossing(u: &Vector3<f64>, v: &Vector3<f64>, r: &Vector3<f64>) -> Option<(f64, f64)> {
     let (a, e, b) = (u.norm_squared(), v.norm_squared(), u.dot(v));
     let denominator = a * e - b * b;
     let crosses = denominator > PARALLEL_SINE * PARALLEL_SINE * a * e; // false for NaN
@@ -178,7 +181,7 @@ pub(super) fn crossing(u: &Vector3<f64>, v: &Vector3<f64>, r: &Vector3<f64>) -> 
 pub(super) fn knob_face(a: &Knob, mesh: &Mesh, t: u32) -> Option<Row> {
     let (corners, normal) = (mesh.corners(t), *mesh.face_normal(t));
     let height = normal.dot(&(a.at - corners[0]));
-    if !is_over(&a.at, &corners, &normal, height) || !a.cone.holds(&-normal, LOOK_AHEAD_TILT) {
+    if !is_over(&a.at, &corners, &normal, height) || !a.skin.cone.holds(&-normal, LOOK_AHEAD_TILT) {
         return None;
     }
     Some(row_over_face(a, t, &normal, height))
@@ -189,11 +192,11 @@ pub(super) fn knob_face(a: &Knob, mesh: &Mesh, t: u32) -> Option<Row> {
 pub(super) fn knob_past_face(a: &Knob, mesh: &Mesh, t: u32, within: f64) -> Option<Row> {
     let (corners, normal) = (mesh.corners(t), *mesh.face_normal(t));
     let height = normal.dot(&(a.at - corners[0]));
-    let gap = height - a.round;
-    let past = a.round > 0.0
+    let gap = height - a.skin.round;
+    let past = a.skin.round > 0.0
         && gap >= 0.0
         && gap <= within // false for NaN
-        && a.cone.holds(&-normal, LOOK_AHEAD_TILT)
+        && a.skin.cone.holds(&-normal, LOOK_AHEAD_TILT)
         && covers_ball(mesh, t, &a.at);
     past.then(|| row_over_face(a, t, &normal, height))
 }
@@ -201,25 +204,23 @@ pub(super) fn knob_past_face(a: &Knob, mesh: &Mesh, t: u32, within: f64) -> Opti
 /// The row of a point `height` (m) above the plane of triangle `t`.
 fn row_over_face(a: &Knob, t: u32, normal: &Vector3<f64>, height: f64) -> Row {
     Row::between(
-        [a.feature, Feature::Face(t)],
+        [a.skin.feature, Feature::Face(t)],
         [a.at, a.at - normal * height],
-        [a.round, 0.0],
+        [a.skin.round, 0.0],
         *normal,
     )
 }
 
 /// A point over a half-space.
 pub(super) fn knob_plane(a: &Knob, normal: &Vector3<f64>, point: &Point3<f64>) -> Option<Row> {
-    if !a.cone.holds(&-normal, LOOK_AHEAD_TILT) {
-        return None;
-    }
+    let plane = Skin {
+        round: 0.0,
+        cone: Cone::Any,
+        feature: Feature::Whole,
+    };
     let foot = a.at - normal * normal.dot(&(a.at - point));
-    Some(Row::between(
-        [a.feature, Feature::Whole],
-        [a.at, foot],
-        [a.round, 0.0],
-        *normal,
-    ))
+    let tilts = [LOOK_AHEAD_TILT; 2];
+    a.skin.row(&plane, [a.at, foot], *normal, tilts)
 }
 
 /// Weights of the corners of triangle `t` at a point of it.

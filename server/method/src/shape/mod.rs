@@ -1,8 +1,8 @@
 //! Shapes: exact primitives beside meshes, on either side.
 //!
 //! A [`Body`] or an [`Obstacle`] with a [`Primitive`] has exactly that form; its mesh, a tessellation within it, is for drawing and for
-//! independent checks. Two meshes go the way of [`collision`](crate::collision) and [`constraint`](crate::constraint); all else is here. Spheres,
-//! capsules and cylinders have no facets: normals are exact, and sliding round them is smooth.
+//! independent checks. Impacts are searched by [`collision`](crate::collision), whatever the shapes; contacts of two meshes are collected by
+//! [`constraint`](crate::constraint), all others here. Spheres, capsules and cylinders have no facets: normals are exact, and sliding round them is smooth.
 
 mod bound;
 mod collect;
@@ -17,6 +17,7 @@ mod rim;
 mod separation;
 mod touching;
 
+pub use collect::collect;
 pub use primitive::{Nearest, Primitive, PrimitiveError};
 pub(crate) use separation::separation;
 
@@ -25,10 +26,8 @@ use nalgebra::{Point3, Vector3};
 use crate::collision::{
     AdvancementSettings, Collider, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
 };
-use crate::constraint::{Collected, Contact, collect_contacts};
 use crate::spatial::{Pose, Vector6, advance_pose, at_reference_point, pose_difference};
 use crate::world::{Body, Obstacle, World};
-use collect::Pairing;
 
 /// Says which primitive of a world cannot be used, by its body's name, and why.
 pub(crate) fn check_primitives(world: &World) -> Result<(), (String, PrimitiveError)> {
@@ -143,50 +142,4 @@ pub(crate) fn time_of_impact_of_obstacle(
             time_of_impact(body, motion, obstacle, &stands, settings, workspace, work)
         }
     }
-}
-
-/// [`collect_contacts`] for any shapes: appends every contact within `activation_distance` (m) to `out`, nearest first.
-#[allow(
-    clippy::too_many_arguments,
-    reason = "two placed shapes, a distance, and memory to work in"
-)]
-pub fn collect(
-    body: &Body,
-    body_pose: &Pose,
-    obstacle: &Obstacle,
-    obstacle_pose: &Pose,
-    obstacle_index: u16,
-    activation_distance: f64,
-    workspace: &mut CollisionWorkspace,
-    out: &mut Vec<Contact>,
-    work: &mut Work,
-) -> Collected {
-    let pairing = match (&body.primitive, &obstacle.primitive) {
-        (None, None) => {
-            return collect_contacts(
-                &body.mesh,
-                body_pose,
-                &obstacle.mesh,
-                obstacle_pose,
-                obstacle_index,
-                activation_distance,
-                workspace,
-                out,
-                work,
-            );
-        }
-        (Some(a), Some(b)) => Pairing::Primitives(a, b),
-        (Some(a), None) => Pairing::BodyPrimitive(a, &obstacle.mesh),
-        (None, Some(b)) => Pairing::BodyMesh(&body.mesh, b),
-    };
-    collect::collect(
-        &pairing,
-        body_pose,
-        obstacle_pose,
-        obstacle_index,
-        activation_distance,
-        workspace,
-        out,
-        work,
-    )
 }

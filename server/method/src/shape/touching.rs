@@ -1,12 +1,13 @@
 //! A primitive as what can touch: the rows between it and points, segments, triangles and other primitives.
 
+use arrayvec::ArrayVec;
 use nalgebra::Vector3;
 
 use super::Primitive;
 use super::cylinder::Cylinder;
 use super::cylinder_pair::cylinder_cylinder;
 use super::element::{
-    Cone, Knob, Rod, Row, knob_face, knob_knob, knob_past_face, knob_plane, knob_rod, rod_rod,
+    Cone, Knob, Rod, Row, Skin, knob_face, knob_knob, knob_past_face, knob_plane, knob_rod, rod_rod,
 };
 use super::implied::ImpliedRows;
 use super::primitive::unit_axis;
@@ -15,10 +16,10 @@ use crate::constraint::Feature;
 use crate::geometry::Mesh;
 
 /// A primitive in the common frame, as what can touch.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Touching {
-    Ball(Knob<'static>),
-    Capsule([Knob<'static>; 2], Rod<'static>),
+    /// A sphere has a point, a capsule its ends and a segment.
+    Round(ArrayVec<Knob<'static>, 2>, Option<Rod<'static>>),
     Cylinder(Cylinder),
     Plane(Vector3<f64>, nalgebra::Point3<f64>),
 }
@@ -36,29 +37,35 @@ impl Touching {
             Some(placement) if back => placement.rotation.tr_mul(v),
             Some(placement) => placement.rotation * v,
         };
+        let skin = |round, cone, feature| Skin {
+            round,
+            cone,
+            feature,
+        };
         match primitive {
-            Primitive::Sphere { center, radius } => Self::Ball(Knob {
-                at: point(center),
-                round: *radius,
-                cone: Cone::Any,
-                feature: Feature::Whole,
-            }),
+            Primitive::Sphere { center, radius } => {
+                let mut knobs = ArrayVec::new();
+                knobs.push(Knob {
+                    at: point(center),
+                    skin: skin(*radius, Cone::Any, Feature::Whole),
+                });
+                Self::Round(knobs, None)
+            }
             Primitive::Capsule { ends, radius } => {
                 let axis = turn(&unit_axis(ends));
                 let ends = ends.map(|p| point(&p));
-                let knob = |k: usize| Knob {
-                    at: ends[k],
-                    round: *radius,
-                    cone: Cone::End(if k == 0 { -axis } else { axis }),
-                    feature: Feature::Cap(k as u8),
+                let knob = |k: usize| {
+                    let outward = if k == 0 { -axis } else { axis };
+                    Knob {
+                        at: ends[k],
+                        skin: skin(*radius, Cone::End(outward), Feature::Cap(k as u8)),
+                    }
                 };
                 let side = Rod {
                     ends,
-                    round: *radius,
-                    cone: Cone::Any,
-                    feature: Feature::Side,
+                    skin: skin(*radius, Cone::Any, Feature::Side),
                 };
-                Self::Capsule([knob(0), knob(1)], side)
+                Self::Round([knob(0), knob(1)].into(), Some(side))
             }
             Primitive::Cylinder { ends, radius } => {
                 Self::Cylinder(Cylinder::new(ends, *radius, point, turn))
@@ -67,15 +74,6 @@ impl Touching {
                 normal,
                 point: through,
             } => Self::Plane(turn(normal), point(through)),
-        }
-    }
-
-    /// Points and segment, for what is round all over.
-    pub(super) fn round(&self) -> Option<(&[Knob<'static>], Option<&Rod<'static>>)> {
-        match self {
-            Self::Ball(ball) => Some((std::slice::from_ref(ball), None)),
-            Self::Capsule(ends, side) => Some((ends, Some(side))),
-            Self::Cylinder(_) | Self::Plane(..) => None,
         }
     }
 }
@@ -92,8 +90,8 @@ pub(super) fn rows_of_triangle(
     match touching {
         Touching::Cylinder(cylinder) => cylinder.face(mesh, t, activation_distance, &mut *found),
         Touching::Plane(..) => {}
-        Touching::Ball(_) | Touching::Capsule(..) => {
-            for knob in touching.round().into_iter().flat_map(|(knobs, _)| knobs) {
+        Touching::Round(knobs, _) => {
+            for knob in knobs {
                 if let Some(row) = knob_face(knob, mesh, t) {
                     found(row);
                 } else if let Some(row) = knob_past_face(knob, mesh, t, implied.within()) {
@@ -111,9 +109,11 @@ pub(super) fn rows_of_triangle(
         if owned & (1 << k) != 0 {
             let knob = Knob {
                 at: mesh.vertices()[v as usize],
-                round: 0.0,
-                cone: Cone::Vertex(mesh, v),
-                feature: Feature::Vertex(v),
+                skin: Skin {
+                    round: 0.0,
+                    cone: Cone::Vertex(mesh, v),
+                    feature: Feature::Vertex(v),
+                },
             };
             primitive_knob(touching, &knob, found);
         }
@@ -123,9 +123,11 @@ pub(super) fn rows_of_triangle(
                 ends: mesh.edges()[e as usize]
                     .vertices
                     .map(|v| mesh.vertices()[v as usize]),
-                round: 0.0,
-                cone: Cone::Edge(mesh, e),
-                feature: Feature::Edge(e),
+                skin: Skin {
+                    round: 0.0,
+                    cone: Cone::Edge(mesh, e),
+                    feature: Feature::Edge(e),
+                },
             };
             primitive_rod(touching, &rod, found);
         }
@@ -147,14 +149,12 @@ fn primitive_knob(touching: &Touching, other: &Knob<'_>, found: &mut dyn FnMut(R
         Touching::Plane(normal, point) => {
             hand_on(knob_plane(other, normal, point).map(Row::reversed), found);
         }
-        Touching::Ball(knob) => {
-            hand_on(knob_knob(knob, other), found);
-        }
-        Touching::Capsule(ends, side) => {
-            for end in ends {
-                hand_on(knob_knob(end, other), found);
+        Touching::Round(knobs, rod) => {
+            for knob in knobs {
+                hand_on(knob_knob(knob, other), found);
             }
-            hand_on(knob_rod(other, side).map(Row::reversed), found);
+            let beside = rod.as_ref().and_then(|rod| knob_rod(other, rod));
+            hand_on(beside.map(Row::reversed), found);
         }
     }
 }
@@ -163,18 +163,15 @@ fn primitive_knob(touching: &Touching, other: &Knob<'_>, found: &mut dyn FnMut(R
 fn primitive_rod(touching: &Touching, other: &Rod<'_>, found: &mut dyn FnMut(Row)) {
     match touching {
         Touching::Cylinder(cylinder) => {
-            hand_on(cylinder.rod_on_side(other), found);
+            hand_on(rod_rod(&cylinder.side(), other), found);
             cylinder.rod_on_rims(other, found);
         }
         Touching::Plane(..) => {} // its ends stand for it
-        Touching::Ball(knob) => {
-            hand_on(knob_rod(knob, other), found);
-        }
-        Touching::Capsule(ends, side) => {
-            for end in ends {
-                hand_on(knob_rod(end, other), found);
+        Touching::Round(knobs, rod) => {
+            for knob in knobs {
+                hand_on(knob_rod(knob, other), found);
             }
-            hand_on(rod_rod(side, other), found);
+            hand_on(rod.as_ref().and_then(|rod| rod_rod(rod, other)), found);
         }
     }
 }
@@ -187,11 +184,7 @@ pub(super) fn primitive_pair(a: &Touching, b: &Touching, reach: f64, found: &mut
             cylinder.rims_over(normal, point, false, Feature::Whole, |_, _| true, found);
         }
         (Touching::Cylinder(a), Touching::Cylinder(b)) => cylinder_cylinder(a, b, reach, found),
-        (_, Touching::Ball(_) | Touching::Capsule(..)) => {
-            let (knobs, rod) = match b.round() {
-                Some(round) => round,
-                None => return,
-            };
+        (_, Touching::Round(knobs, rod)) => {
             for knob in knobs {
                 primitive_knob(a, knob, found);
             }

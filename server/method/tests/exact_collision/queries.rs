@@ -23,7 +23,33 @@ pub(crate) struct Query {
     pub(crate) truth: bool,
 }
 
+impl Kind {
+    /// How many of the four points are the first feature's.
+    pub(crate) fn points_of_first(self) -> usize {
+        match self {
+            Self::VertexFace => 1,
+            Self::EdgeEdge => 2,
+        }
+    }
+}
+
 impl Query {
+    /// The features as they start, and as parts of rigid bodies: the second rests, and the first goes where its first point does as seen from the first of
+    /// the second. `truth` is that of the file, of the points that move each for itself.
+    pub(crate) fn rigid(&self) -> Self {
+        let first = self.kind.points_of_first();
+        let path = |k: usize| self.end[k] - self.start[k];
+        let way = path(0) - path(first);
+        let mut end = self.start;
+        for point in &mut end[..first] {
+            *point += way;
+        }
+        Self {
+            end,
+            ..self.clone()
+        }
+    }
+
     /// Longest side of the box around all eight points, m: the query's scale.
     pub(crate) fn size(&self) -> f64 {
         let all = self.start.iter().chain(&self.end);

@@ -6,20 +6,20 @@ use nalgebra::{Point3, Vector3};
 
 /// Closest points of segments `p0 p1` and `q0 q1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ClosestOnEdges {
+pub(super) struct ClosestOnEdges {
     /// Fraction along the first segment, in [0, 1].
-    pub on_first: f64,
+    pub(super) on_first: f64,
     /// Fraction along the second segment, in [0, 1].
-    pub on_second: f64,
+    pub(super) on_second: f64,
     /// From the point on the second to the point on the first, m.
-    pub difference: Vector3<f64>,
+    pub(super) difference: Vector3<f64>,
 }
 
 /// Closest points of two segments; any pair of closest points where there are many, or where a segment is a point.
 ///
 /// Each fraction is the exact optimum for the other one, so that nearly parallel segments lose no distance.
 #[inline]
-pub fn closest_on_edges(p: [&Point3<f64>; 2], q: [&Point3<f64>; 2]) -> ClosestOnEdges {
+pub(super) fn closest_on_edges(p: [&Point3<f64>; 2], q: [&Point3<f64>; 2]) -> ClosestOnEdges {
     let (u, v, r) = (p[1] - p[0], q[1] - q[0], p[0] - q[0]);
     let (a, e, b) = (u.norm_squared(), v.norm_squared(), u.dot(&v));
     let (c, f) = (u.dot(&r), v.dot(&r));

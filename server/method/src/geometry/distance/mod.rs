@@ -5,7 +5,6 @@ mod point_triangle;
 mod triangle_intersection;
 mod triangle_triangle;
 
-pub use edge_edge::{ClosestOnEdges, closest_on_edges};
 pub use point_triangle::{ClosestOnTriangle, barycentric, closest_on_triangle};
 pub use triangle_intersection::triangles_intersect;
 pub use triangle_triangle::{ClosestOnTriangles, closest_on_triangles};
