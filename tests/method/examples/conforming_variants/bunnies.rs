@@ -95,9 +95,9 @@ fn run_motions(repeats: usize) {
                 let still = Pose::identity();
                 let work = &mut Work::default();
                 found = time_of_impact(
-                    bunny,
+                    &*bunny,
                     &motion,
-                    bunny,
+                    &*bunny,
                     &still,
                     &settings,
                     &mut workspace,
