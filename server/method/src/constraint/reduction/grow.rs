@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::at::{At, Purpose, Surfaces};
-use super::neighbours::{Arrival, for_neighbours};
+use super::neighbours::{for_neighbours, for_turned};
 use super::row::{Known, face};
 use super::{MAX_ROUNDS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES};
 use crate::collision::{Placement, Work};
@@ -98,7 +98,7 @@ impl RowReduction {
             if !held && !near {
                 continue;
             }
-            let mut consider = |features: FeaturePair| {
+            let consider = |features: FeaturePair| {
                 if self.knows(&features) {
                     return;
                 }
@@ -117,14 +117,7 @@ impl RowReduction {
                     });
                 }
             };
-            match Arrival::of(at, &pair, motion) {
-                Arrival::Over(features) => consider(features),
-                Arrival::Off => {}
-                Arrival::OfNoVertex => {
-                    let obstacle = &at.world.obstacles[usize::from(pair.obstacle)].mesh;
-                    for_neighbours(&at.world.body.mesh, obstacle, &pair, consider);
-                }
-            }
+            for_turned(at, &pair, motion, consider);
         }
         self.now > before
     }
