@@ -17,7 +17,7 @@ pub use collect::collect_contacts;
 pub(crate) use collect::{Nearest, collect_bounded, in_world};
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
-pub(crate) use reduction::{At, MAX_ROWS, Place, Purpose, RowReduction, Surfaces};
+pub(crate) use reduction::{At, MAX_ROWS, Place, Purpose, RowReduction, Surfaces, Wished};
 pub(crate) use reentrant::covers_ball;
 pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};

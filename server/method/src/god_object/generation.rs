@@ -10,7 +10,7 @@ use super::simulation::SET_PERIODS;
 use super::substep::Update;
 use super::{GodObject, StepReport};
 use crate::collision::{MAX_MOTIONS, Work};
-use crate::constraint::{At, Purpose, RowReduction, Surfaces};
+use crate::constraint::{At, Purpose, RowReduction, Surfaces, Wished};
 use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
 use crate::surface::Friction;
@@ -63,17 +63,27 @@ impl GodObject {
         self.reduction.is_some()
     }
 
-    /// Finds the rows that the projection of `unconstrained` needs.
+    /// Finds the rows that the projection of `unconstrained` needs, of the candidates and of what rows turn into.
     pub(super) fn complete(&mut self, unconstrained: &Vector6, report: &mut StepReport) {
         let motion = [*unconstrained];
-        self.complete_for(&motion, Purpose::Motion, &mut report.work);
-        if self.reduction.as_ref().is_some_and(|r| r.is_outdated()) {
-            // Of the present pose, within the distance of the last collection.
-            self.with_reduction(|this, reduction, at| {
-                this.collect_candidates(reduction, at, this.collected_within, &mut report.work);
-            });
-            self.complete_for(&motion, Purpose::Motion, &mut report.work);
-        }
+        self.with_reduction(|this, reduction, at| {
+            let work = &mut report.work;
+            this.answers(reduction, at, &motion, Purpose::Motion, work);
+            if reduction.is_outdated() {
+                // Of the present pose, within the distance of the last collection.
+                this.collect_candidates(reduction, at, this.collected_within, work);
+                this.answers(reduction, at, &motion, Purpose::Motion, work);
+            }
+        });
+        self.write_set();
+    }
+
+    /// Adds those pairs to the candidates that a motion violates which is to be made, where surfaces conform. Whether there are any.
+    pub(super) fn search_along(&mut self, motion: &Vector6, report: &mut StepReport) -> bool {
+        let any = self.with_reduction(|this, reduction, at| {
+            this.search(reduction, at, &[*motion], Purpose::Motion, &mut report.work)
+        });
+        any == Some(true)
     }
 
     /// Finds the rows that the force needs: for the device's present pose, and for those that it may take until the next set.
@@ -203,14 +213,13 @@ impl GodObject {
         purpose: Purpose,
         work: &mut Work,
     ) -> ArrayVec<Vector6, MAX_MOTIONS> {
-        let surfaces = self.surfaces(None);
-        let mut answer = |(k, motion)| {
-            let of = (at, &surfaces as &dyn Surfaces);
-            let turns = k < SEARCHED_MOTIONS;
-            let projection = reduction.complete(of, motion, (purpose, turns), work);
-            projection.acceleration
+        let wished = Wished {
+            motions,
+            turning: SEARCHED_MOTIONS,
+            purpose,
         };
-        motions.iter().enumerate().map(&mut answer).collect()
+        let projections = reduction.complete((at, &self.surfaces(None)), &wished, work);
+        projections.iter().map(|it| it.acceleration).collect()
     }
 
     /// Eq. (1) with the rows that its answer needs: friction, and what must be out of the way, lead elsewhere than the wish alone.

@@ -10,9 +10,8 @@ use crate::collision::Work;
 use crate::constraint::{At, Purpose, RowReduction, Violated, for_violated};
 use crate::spatial::Vector6;
 
-/// How much more work a search for the force may take where an obstacle stopped the body in this update, which says that pairs are missing; and how much
-/// less a search for a motion, which needs no more than what it violates deepest: an obstacle stops it otherwise. Of 310 variants of conforming
-/// parts (`conforming_variants --quick`, seeds 1 to 12) the force is off by at most 77, 25 and 25 % with 4, 16 and 64 times as much.
+/// How much more work a search for the force may take where an obstacle stopped the body in this update, which says that pairs are missing. Of 310 variants
+/// of conforming parts (`conforming_variants --quick`, seeds 1 to 12) the force is off by at most 77, 25 and 25 % with 4, 16 and 64 times as much.
 const SEARCH_FACTOR: u64 = 16;
 
 impl GodObject {
@@ -43,10 +42,10 @@ impl GodObject {
             .settings
             .look_ahead_pairs
             .saturating_mul(answers.len() as u64);
-        let pairs = match (purpose.is_felt(), self.was_stopped) {
-            (false, _) => pairs / SEARCH_FACTOR,
-            (true, false) => pairs,
-            (true, true) => pairs.saturating_mul(SEARCH_FACTOR),
+        let pairs = if purpose.is_felt() && self.was_stopped {
+            pairs.saturating_mul(SEARCH_FACTOR)
+        } else {
+            pairs
         };
         let mut any = false;
         for index in 0..at.places.len() {

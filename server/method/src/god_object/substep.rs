@@ -85,7 +85,13 @@ impl GodObject {
             return false;
         }
         // 3. Project. The way that comes out may be longer than the linear constraints are trusted for: then less is asked for.
-        let Some((projected, cut)) = self.project_trusted(left, report) else {
+        let tight = self.set.gap_min < TIGHT_GAP_SHARE * self.settings.rest_distance;
+        let left_to_next = if tight {
+            0.0
+        } else {
+            LEAST_STEP_SHARE * update.made
+        };
+        let Some((projected, cut)) = self.project_trusted(left, left_to_next, report) else {
             return false;
         };
         let covered = self.motion_length(&projected.acceleration);
@@ -105,12 +111,7 @@ impl GodObject {
             .relax(&projected.acceleration, self.radius);
         // What is little beside the way made so far is left to the next update; but for easing out, which is little always: a body left far below
         // the rest distance stops at every motion. Nor is a motion little that was cut to what is trusted, or that begins a fall.
-        let tight = self.set.gap_min < TIGHT_GAP_SHARE * self.settings.rest_distance;
-        let little = if tight || cut {
-            0.0
-        } else {
-            LEAST_STEP_SHARE * update.made
-        };
+        let little = if cut { 0.0 } else { left_to_next };
         // What sticks creeps by as much as friction's answer is in error: that is no motion.
         let (moving, error) = self.motion_with_friction(&projected.acceleration);
         let long_enough = moving > self.settings.motion_tolerance.max(error)
@@ -162,12 +163,16 @@ impl GodObject {
 
     /// Eq. (1) for as much of `left` as leads no farther than the constraints are trusted for; whether that is less than all. Where the rounds of
     /// re-linearised rows do not come to rest, half of the way is asked for, until they do or the linear rows are true.
+    ///
+    /// What conforms is searched along a motion that is to be made, and longer than `little` (m): one that is not needs no row more.
     fn project_trusted(
         &mut self,
         left: &Vector6,
+        little: f64,
         report: &mut StepReport,
     ) -> Option<(Projected, bool)> {
         let straight = self.straight_length();
+        let least = little.max(self.settings.motion_tolerance);
         let (mut share, mut asked, mut attempts) = (1.0, f64::INFINITY, 0);
         loop {
             attempts += 1;
@@ -175,7 +180,12 @@ impl GodObject {
             self.carry.ask(share);
             self.complete(&wish, report);
             let mut projected = self.project_complete(&wish, None, report)?;
-            let covered = self.motion_length(&projected.acceleration);
+            let mut covered = self.motion_length(&projected.acceleration);
+            if covered > least && self.search_along(&projected.acceleration, report) {
+                self.complete(&wish, report);
+                projected = self.project_complete(&wish, None, report)?;
+                covered = self.motion_length(&projected.acceleration);
+            }
             let trusted = if projected.settled {
                 self.trust_length
             } else {

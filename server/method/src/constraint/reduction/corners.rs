@@ -2,10 +2,12 @@
 
 use super::RowReduction;
 use super::at::{At, Purpose, Surfaces};
+use super::grow::Wished;
 use super::met::{are_corners, clearance, met};
 use super::row::Known;
 use crate::collision::Work;
 use crate::constraint::Contact;
+use crate::quasi_statics::Projection;
 use crate::spatial::Vector6;
 
 /// Pairs of corners that are set aside, and candidates that stand for another plane than their own.
@@ -46,20 +48,31 @@ impl RowReduction {
         {
             return false;
         }
-        let held = self.complete(of, &continued(motion), (Purpose::Force, false), work);
-        let mut holding = held
-            .active
-            .iter()
-            .filter_map(|row| self.known.get(row.row as usize));
+        let held = self.complete_for_force(of, &continued(motion), work);
+        let held = held.iter().flat_map(|projection| &projection.active);
+        let mut holding = held.filter_map(|row| self.known.get(row.row as usize));
         if !holding.any(|row| are_corners(&row.contact.features)) {
             return false;
         }
         self.set_corners_aside();
         // What holds the body elsewhere leads it past some of them.
-        let answer = self
-            .complete(of, motion, (Purpose::Force, false), work)
-            .acceleration;
-        self.bring_corners_back(of, &continued(&answer))
+        let answers = self.complete_for_force(of, motion, work);
+        let mut ways = answers.iter().map(|answer| continued(&answer.acceleration));
+        ways.any(|way| self.bring_corners_back(of, &way))
+    }
+
+    fn complete_for_force(
+        &mut self,
+        of: (&At, &dyn Surfaces),
+        motion: &Vector6,
+        work: &mut Work,
+    ) -> Option<Projection> {
+        let wished = Wished {
+            motions: &[*motion],
+            turning: 0,
+            purpose: Purpose::Force,
+        };
+        self.complete(of, &wished, work).pop()
     }
 
     fn set_corners_aside(&mut self) {

@@ -6,7 +6,7 @@ use super::at::{At, Purpose, Surfaces};
 use super::neighbours::{for_neighbours, for_turned};
 use super::row::{Known, face};
 use super::{MAX_ROUNDS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES};
-use crate::collision::{Placement, Work};
+use crate::collision::{MAX_MOTIONS, Placement, Work};
 use crate::constraint::collect::{for_contacts, in_world};
 use crate::constraint::facing::Facing;
 use crate::constraint::{Contact, FeaturePair};
@@ -14,40 +14,52 @@ use crate::geometry::Mesh;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection};
 use crate::spatial::Vector6;
 
+/// Motions whose projections are to violate no candidate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wished<'a> {
+    pub(crate) motions: &'a [Vector6],
+    /// The projections of the first so many are to violate nothing either that rows turn into.
+    pub(crate) turning: usize,
+    pub(crate) purpose: Purpose,
+}
+
 impl RowReduction {
-    /// Adds rows until the projection of `unconstrained` violates none by more than the tolerance, nor, where it `turns`, any of what the rows turn into; the
-    /// projection.
+    /// Adds rows until the projection of each motion, at most [`MAX_MOTIONS`], violates none by more than the tolerance; the projections.
     pub(crate) fn complete(
+        &mut self,
+        of: (&At, &dyn Surfaces),
+        wished: &Wished<'_>,
+        work: &mut Work,
+    ) -> ArrayVec<Projection, MAX_MOTIONS> {
+        let mut prepared = false;
+        let mut complete_one = |(k, motion)| {
+            let turns = k < wished.turning;
+            self.complete_one(of, motion, (wished.purpose, turns), &mut prepared, work)
+        };
+        let motions = wished.motions.iter().take(MAX_MOTIONS);
+        motions.enumerate().map(&mut complete_one).collect()
+    }
+
+    /// The same for one. The projector is made ready for the rows where it is not `prepared`, and after each that is added.
+    fn complete_one(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
         unconstrained: &Vector6,
         (purpose, turns): (Purpose, bool),
+        prepared: &mut bool,
         work: &mut Work,
     ) -> Projection {
-        let least_gap = purpose.least_gap(at);
         self.warm_start.clear();
         let mut rounds = 0;
         loop {
-            self.rows.clear();
-            let known = self.known.iter().map(|row| {
-                let (jacobian, nearer) = row.for_purpose(purpose);
-                (jacobian, row.contact.gap, nearer)
-            });
-            let given = self
-                .given
-                .iter()
-                .map(|(jacobian, gap)| (*jacobian, *gap, 0.0));
-            let all = known.chain(given);
-            self.rows
-                .extend(all.map(|(jacobian, gap, nearer)| HalfSpace {
-                    jacobian,
-                    bound: at.rest_distance - gap.max(least_gap) + nearer,
-                }));
+            if !std::mem::replace(prepared, true) {
+                self.prepare(at, purpose);
+            }
             work.projections += 1;
             self.now += 1;
-            let projection =
-                self.projector
-                    .project(&at.metric, unconstrained, &self.rows, &self.warm_start);
+            let projection = self
+                .projector
+                .project_prepared(unconstrained, &self.warm_start);
             self.warm_start.clear();
             self.warm_start
                 .extend(projection.active.iter().map(|row| row.row));
@@ -58,21 +70,41 @@ impl RowReduction {
             }
             rounds += 1;
             let answer = &projection.acceleration;
+            let before = self.now;
             let violation = self.add_most_violated((at, surfaces), answer, purpose, work);
             let finished = violation <= at.tolerance || rounds == MAX_ROUNDS; // false for NaN
-            if finished || !violation.is_finite() {
-                if turns
-                    && rounds < MAX_ROUNDS
-                    && self.add_turned((at, surfaces), answer, purpose, work)
-                {
-                    continue;
-                }
+            let finished = finished || !violation.is_finite();
+            let turned = finished
+                && turns
+                && rounds < MAX_ROUNDS
+                && self.add_turned((at, surfaces), answer, purpose, work);
+            *prepared = self.now == before;
+            if finished && !turned {
                 let is_known = violation.is_finite() && projection.kkt_residual <= KKT_TOLERANCE;
                 let error = if is_known { violation } else { f64::INFINITY };
                 self.error = self.error.max(error);
                 return projection;
             }
         }
+    }
+
+    /// Makes the projector ready for the rows known, as the purpose sees them, and those given.
+    fn prepare(&mut self, at: &At, purpose: Purpose) {
+        let least_gap = purpose.least_gap(at);
+        let known = self.known.iter().map(|row| {
+            let (jacobian, nearer) = row.for_purpose(purpose);
+            (jacobian, row.contact.gap, nearer)
+        });
+        let given = self.given.iter();
+        let given = given.map(|(jacobian, gap)| (*jacobian, *gap, 0.0));
+        let all = known.chain(given);
+        self.rows.clear();
+        self.rows
+            .extend(all.map(|(jacobian, gap, nearer)| HalfSpace {
+                jacobian,
+                bound: at.rest_distance - gap.max(least_gap) + nearer,
+            }));
+        self.projector.prepare(&at.metric, &self.rows);
     }
 
     /// Adds the pairs that those of rows turn into which hold the body, where the motion violates them by more than the tolerance; whether there are any. For a

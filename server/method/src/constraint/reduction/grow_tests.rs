@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
 use super::at::{At, Place, Purpose, Surfaces};
+use super::grow::Wished;
 use super::row::face;
 use super::{MAX_STALE, RowReduction};
 use crate::collision::Work;
@@ -128,7 +129,13 @@ fn a_row_behind_many_candidates_that_face_no_more_is_found() {
     let here = block_on_block(0.0);
     reduction.move_to((&here, &Plain), None, work);
     let wish = Vector6::new(0.0, 0.0, -5.0 * GAP, 0.0, 0.0, 0.0);
-    let answer = reduction.complete((&here, &Plain), &wish, (Purpose::Motion, true), work);
+    let wished = Wished {
+        motions: &[wish],
+        turning: 1,
+        purpose: Purpose::Motion,
+    };
+    let answers = reduction.complete((&here, &Plain), &wished, work);
+    let answer = answers.first().expect("one");
     let down = -answer.acceleration[2];
     assert!((down - (GAP - REST)).abs() < 1e-8, "{down}");
     assert!(reduction.error() <= here.tolerance, "{}", reduction.error());

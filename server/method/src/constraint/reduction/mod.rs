@@ -39,6 +39,7 @@ mod row;
 use arrayvec::ArrayVec;
 
 pub(crate) use at::{At, Place, Purpose, Surfaces};
+pub(crate) use grow::Wished;
 
 use super::{Contact, FeaturePair, NonPenetrationConstraint, contact_jacobian};
 use crate::collision::Work;
