@@ -72,7 +72,8 @@ impl Problem<'_> {
     }
 }
 
-/// Whether the ball about the mesh's volume of a pair stays beyond a primitive in an interval: boxes say little of what is round.
+/// Whether the mesh's volume of a pair stays beyond a primitive in an interval. The primitive is on one side of the plane through its point nearest to the
+/// volume's centre; the volume is on the other while the centre's distance exceeds its extent and what the interval adds. Boxes say little of what is round.
 #[inline]
 fn stays_beyond(
     (primitive, side): (&Primitive, Side),
@@ -84,9 +85,13 @@ fn stays_beyond(
         Side::Body => (trees.0, pair.0, trees.1),
         Side::Obstacle => (trees.1, pair.1, trees.0),
     };
-    let at = other.origin + volumes.seen_by_other(side, &tree.center(child));
-    let reach = f64::from(tree.radius(child)) + volumes.longest_stray();
-    primitive.nearest(&at).distance > reach // false for NaN
+    let center = tree.center(child);
+    let (at, added) = volumes.seen_by_other(side, &center);
+    let nearest = primitive.nearest(&(other.origin + at));
+    let radius = f64::from(tree.radius(child));
+    let in_mesh = volumes.frame(side).turn.tr_mul(&nearest.normal);
+    let extent = tree.extent(child, &in_mesh).min(radius);
+    nearest.distance > extent + added.along(&nearest.normal, radius) // false for NaN
 }
 
 /// A search for every pair of pieces that may face each other within the gap at some time before the first impact so far, with the vectors

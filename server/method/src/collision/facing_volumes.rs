@@ -84,6 +84,25 @@ pub(crate) struct FacingVolumes {
     pub(super) turn: [f32; 2],
 }
 
+/// What half an interval adds to the way between a volume at rest and one of the other tree, m and rad.
+pub(super) struct Added {
+    sweep: Vector3<f64>,
+    path: f64,
+    angle: f64,
+    arm: f64,
+    /// Of the origin of the body's tree from its straight path, with the margin and rounding.
+    stray: f64,
+}
+
+impl Added {
+    /// Along a unit direction, for points within `radius` (m): to first order, and what is left of the second, the frame's turn included.
+    pub(super) fn along(&self, n: &Vector3<f64>, radius: f64) -> f64 {
+        let (path, angle) = (self.path, self.angle);
+        let bent = radius + path + 0.5 * angle * (self.arm + radius + path);
+        n.dot(&self.sweep).abs() + angle * bent + self.stray
+    }
+}
+
 /// How the volumes of one tree get into the other tree's frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
@@ -220,15 +239,26 @@ impl FacingVolumes {
         (&body.own_half_path, &body.own_half_turn, body.angle)
     }
 
-    /// A point of one tree, from its origin, in the middle of the interval: from the origin of the other tree and in its axes, m.
-    pub(super) fn seen_by_other(&self, side: Side, point: &Vector3<f64>) -> Vector3<f64> {
+    /// A point of one tree, from its origin, in the middle of the interval: from the origin of the other tree and in its axes, m; and what the interval adds.
+    pub(super) fn seen_by_other(&self, side: Side, point: &Vector3<f64>) -> (Vector3<f64>, Added) {
         let frame = self.frame(side);
-        frame.turn * point + frame.offset
-    }
-
-    /// How far any point of the body may be from there in the interval, with the margin and rounding, m.
-    pub(super) fn longest_stray(&self) -> f64 {
-        f64::from(self.longest_half_sweep) + f64::from(self.stray)
+        let turned = frame.turn * point;
+        let at = turned + frame.offset;
+        let body = self.frame(Side::Body);
+        let wide = |v: &[f32; 3]| Vector3::from(v.map(f64::from));
+        // From the origin of the body's tree, about which the path is.
+        let (path, spin, arm) = match side {
+            Side::Body => (wide(&body.half_path), wide(&body.half_turn), turned),
+            Side::Obstacle => (wide(&body.own_half_path), wide(&body.own_half_turn), at),
+        };
+        let added = Added {
+            sweep: path + spin.cross(&arm),
+            path: path.norm(),
+            angle: f64::from(body.angle),
+            arm: arm.norm(),
+            stray: f64::from(self.stray),
+        };
+        (at, added)
     }
 
     /// Whether points of the body may move by more than `length` (m) in half the interval.

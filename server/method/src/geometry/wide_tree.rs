@@ -185,6 +185,18 @@ impl WideTree {
         Vector3::new(coordinate(0), coordinate(1), coordinate(2))
     }
 
+    /// How far a child's box about its axis reaches from its centre along a unit direction, m, at most.
+    #[inline]
+    pub(crate) fn extent(&self, child: Child, n: &Vector3<f64>) -> f64 {
+        let (node, lane) = (self.node(child / LANES as u32), child as usize % LANES);
+        let wide = |v: &[Lanes; 3]| Vector3::from([0, 1, 2].map(|i| f64::from(v[i].0[lane])));
+        let one = |x: &Lanes| f64::from(x.0[lane]);
+        let (axis, tangent) = (wide(&node.axis), wide(&node.tangent));
+        n.dot(&axis).abs() * (one(&node.middle).abs() + one(&node.slab))
+            + n.dot(&tangent).abs() * one(&node.along)
+            + n.dot(&axis.cross(&tangent)).abs() * one(&node.across)
+    }
+
     /// What tells which of two volumes is to be opened: the thicker one, m; of flat ones, the larger.
     #[inline]
     pub(crate) fn thickness(&self, child: Child) -> f32 {
