@@ -8,6 +8,7 @@ use std::time::Instant;
 use god_object::Mesh;
 use god_object::geometry::{one_sided_distance, self_intersection};
 use meshopt::SimplifyOptions;
+use nalgebra::Point3;
 
 use crate::mesh_file::RawMesh;
 use crate::progress::Progress;
@@ -129,14 +130,21 @@ fn compute(original: Mesh, max_error: f64, body: &str) -> (Mesh, Simplified) {
 
 /// The simplifier's answer for an estimated error, m. Its vertices are vertices of the original, to the last digit.
 fn candidate(original: &Mesh, error: f32) -> RawMesh {
-    let [low, high] = original.bounding_box();
+    reduced(original.vertices(), original.triangles(), error)
+}
+
+/// A surface with fewer triangles, by the simplifier's estimate off by at most this error, m: for what is only seen.
+pub(crate) fn reduced(vertices: &[Point3<f64>], triangles: &[[u32; 3]], error: f32) -> RawMesh {
+    let first = vertices.first().copied().unwrap_or_else(Point3::origin);
+    let around =
+        |(low, high): (Point3<f64>, Point3<f64>), v: &Point3<f64>| (low.inf(v), high.sup(v));
+    let (low, high) = vertices.iter().fold((first, first), around);
     let middle = nalgebra::center(&low, &high);
-    let places: Vec<[f32; 3]> = original
-        .vertices()
+    let places: Vec<[f32; 3]> = vertices
         .iter()
         .map(|v| (v - middle).map(|c| c as f32).into())
         .collect();
-    let mut kept: Vec<u32> = original.triangles().iter().flatten().copied().collect();
+    let mut kept: Vec<u32> = triangles.iter().flatten().copied().collect();
     // One pass stops early on flat faces.
     for _ in 0..MAX_PASSES {
         let options = SimplifyOptions::ErrorAbsolute;
@@ -147,7 +155,7 @@ fn candidate(original: &Mesh, error: f32) -> RawMesh {
             break;
         }
     }
-    let mut place = vec![u32::MAX; original.vertices().len()];
+    let mut place = vec![u32::MAX; vertices.len()];
     let mut raw = RawMesh::default();
     for corners in kept.chunks_exact(3) {
         let mut triangle = [0; 3];
@@ -155,7 +163,7 @@ fn candidate(original: &Mesh, error: f32) -> RawMesh {
             let at = &mut place[*v as usize];
             if *at == u32::MAX {
                 *at = raw.vertices.len() as u32;
-                raw.vertices.push(original.vertices()[*v as usize]);
+                raw.vertices.push(vertices[*v as usize]);
             }
             *corner = *at;
         }

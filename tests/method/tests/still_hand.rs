@@ -128,8 +128,7 @@ fn landing(built: &BuiltScene, random: &mut Random) -> [Pose; 2] {
     let [x, y] = [(); 2].map(|()| 0.012 * (2.0 * random.unit() - 1.0));
     let at = |z: f64| Pose::from_parts(Vector3::new(x, y, z).into(), rotation);
     let obstacle = &built.world.obstacles[0];
-    let meet =
-        |z: f64| shapes_intersect(&built.world.body, &at(z), obstacle, &obstacle.pose);
+    let meet = |z: f64| shapes_intersect(&built.world.body, &at(z), obstacle, &obstacle.pose);
     let (mut high, mut low) = (0.08, 0.0);
     while high - low > 1e-6 {
         let middle = 0.5 * (high + low);

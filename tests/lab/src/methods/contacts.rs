@@ -1,8 +1,6 @@
 //! What the baselines share: contacts near a pose, as rows, and limits of the force.
 
-use god_object::collision::{
-    CollisionWorkspace, Work, shapes_intersect, surfaces_intersect,
-};
+use god_object::collision::{CollisionWorkspace, Work, shapes_intersect, surfaces_intersect};
 use god_object::constraint::{Contact, Separation};
 use god_object::quasi_statics::{HalfSpace, Metric, ProjectionStatus, Projector};
 use god_object::shape::collect;
