@@ -25,37 +25,50 @@ const PALM_SOFT: f64 = 0.016;
 /// The hand as it holds, against its own frame: fingers down, wrist up and back.
 const PITCH_DOWN: f64 = 0.55;
 
-/// A finger's first joint; then its three bones' lengths, m, how far each is bent, degrees, how far it is spread, degrees, and its thickness over that of the
-/// index finger. Lengths: near the means of adults; the bends are those of two fingers that hold and two that rest.
-const FINGERS: [(Point, [f64; 3], [f64; 3], f64, f64); 4] = [
-    (
-        [-0.027, 0.092, 0.000],
-        [0.044, 0.026, 0.020],
-        [46.0, 52.0, 16.0],
-        -1.0,
-        1.0,
-    ),
-    (
-        [-0.005, 0.096, 0.003],
-        [0.048, 0.030, 0.021],
-        [50.0, 52.0, 18.0],
-        1.0,
-        1.03,
-    ),
-    (
-        [0.016, 0.091, 0.001],
-        [0.044, 0.028, 0.021],
-        [60.0, 58.0, 24.0],
-        5.0,
-        0.97,
-    ),
-    (
-        [0.034, 0.081, -0.004],
-        [0.035, 0.020, 0.018],
-        [62.0, 62.0, 28.0],
-        10.0,
-        0.84,
-    ),
+/// A finger that bends.
+struct Finger {
+    /// Its first joint.
+    root: Point,
+    /// Of its bones, m: near the means of adults.
+    lengths: [f64; 3],
+    /// How far each is bent against the one before, degrees: two fingers hold, and two rest.
+    bends: [f64; 3],
+    /// Sideways, degrees.
+    spread: f64,
+    /// Over that of the index finger.
+    thickness: f64,
+}
+
+/// Index finger to little finger.
+const FINGERS: [Finger; 4] = [
+    Finger {
+        root: [-0.027, 0.092, 0.000],
+        lengths: [0.044, 0.026, 0.020],
+        bends: [46.0, 52.0, 16.0],
+        spread: -1.0,
+        thickness: 1.0,
+    },
+    Finger {
+        root: [-0.005, 0.096, 0.003],
+        lengths: [0.048, 0.030, 0.021],
+        bends: [50.0, 52.0, 18.0],
+        spread: 1.0,
+        thickness: 1.03,
+    },
+    Finger {
+        root: [0.016, 0.091, 0.001],
+        lengths: [0.044, 0.028, 0.021],
+        bends: [60.0, 58.0, 24.0],
+        spread: 5.0,
+        thickness: 0.97,
+    },
+    Finger {
+        root: [0.034, 0.081, -0.004],
+        lengths: [0.035, 0.020, 0.018],
+        bends: [62.0, 62.0, 28.0],
+        spread: 10.0,
+        thickness: 0.84,
+    },
 ];
 /// Radii at the joints of an index finger and at its tip, m.
 const FINGER_RADII: [f64; 4] = [0.0108, 0.0094, 0.0083, 0.0070];
@@ -168,15 +181,14 @@ fn smaller(a: f64, b: f64, soft: f64) -> f64 {
     a.min(b) - near * near * soft / 4.0
 }
 
-fn finger(
-    (root, lengths, bends, spread, thickness): &(Point, [f64; 3], [f64; 3], f64, f64),
-) -> [Bone; 3] {
-    let (mut from, mut bend) = (Point3::from(*root), 0.0_f64);
+fn finger(finger: &Finger) -> [Bone; 3] {
+    let (mut from, mut bend) = (Point3::from(finger.root), 0.0_f64);
+    let across = finger.spread.to_radians().sin();
     array::from_fn(|k| {
-        bend += bends[k].to_radians();
-        let across = spread.to_radians().sin();
-        let to = from + Vector3::new(across, bend.cos(), -bend.sin()).normalize() * lengths[k];
-        let radii = [k, k + 1].map(|joint| FINGER_RADII[joint] * thickness);
+        bend += finger.bends[k].to_radians();
+        let way = Vector3::new(across, bend.cos(), -bend.sin()).normalize();
+        let to = from + way * finger.lengths[k];
+        let radii = [k, k + 1].map(|joint| FINGER_RADII[joint] * finger.thickness);
         let bone = Bone {
             ends: [from, to],
             radii,
