@@ -52,7 +52,7 @@ impl Scene {
             .iter()
             .map(|o| made(&o.shape, &o.shape_at, &mut problems))
             .unzip();
-        let mut seen = self.built_scenery(&mut problems);
+        let mut scenery = self.built_scenery(&mut problems);
         let visuals = self.visuals(&mut problems);
         let environment = self.environment().unwrap_or_else(|problem| {
             problems.push(problem);
@@ -98,7 +98,7 @@ impl Scene {
         }
         let obstacles = self.built_obstacles(obstacle_meshes, textures, auto.as_ref(), &motions);
         let looks = [vec![body_look], looks].concat();
-        let bodies = self.drawn_bodies((&body.mesh, &obstacles), &looks, visuals, &mut seen);
+        let bodies = self.drawn_bodies((&body.mesh, &obstacles), &looks, visuals, &mut scenery);
         let hand = spec.hand.as_ref().zip(hand_path);
         let world = World { body, obstacles };
         GodObject::check_start(&world, &settings, &spec.god_object.pose)
@@ -115,9 +115,9 @@ impl Scene {
             }),
             motions,
             bodies,
-            scenery: seen.scenery,
-            carried: seen.carried,
-            lost_looks: seen.lost.into_iter().collect(),
+            scenery: scenery.scenery,
+            carried: scenery.carried,
+            lost_looks: scenery.lost.into_iter().collect(),
             simplified,
             sources: Sources::new(sources),
             view: spec.view,

@@ -14,14 +14,14 @@ use crate::problem::Problem;
 
 /// What is only seen: the scene's own, in its order, and then parts of bodies that are drawn beside them.
 #[derive(Debug, Default)]
-pub(super) struct Seen {
+pub(super) struct SceneryList {
     pub(super) scenery: Vec<BuiltBody>,
     pub(super) carried: Vec<Carried>,
     /// What is lost of looks, a sentence for each file.
     pub(super) lost: BTreeSet<String>,
 }
 
-impl Seen {
+impl SceneryList {
     /// Adds what goes where its carrier goes, at a pose from there; without one it stands.
     fn add(&mut self, body: BuiltBody, carrier: Option<(Carrier, Pose)>) {
         if let Some((by, pose)) = carrier {
@@ -42,7 +42,7 @@ impl Scene {
         (body, obstacles): (&Mesh, &[Obstacle]),
         looks: &[FileLook],
         visuals: Vec<Option<Drawn<'_>>>,
-        seen: &mut Seen,
+        scenery: &mut SceneryList,
     ) -> Vec<BuiltBody> {
         let of = &self.spec.god_object;
         let carrier = Some(Carrier::GodObject);
@@ -59,10 +59,10 @@ impl Scene {
         for (((named, (shape, mesh), carrier), look), visual) in all.zip(looks).zip(visuals) {
             let (shape, mesh, look) =
                 visual.unwrap_or_else(|| (shape, RawMesh::from(mesh), look.clone()));
-            let mut parts = drawn(named, (shape, mesh, look), &mut seen.lost).into_iter();
+            let mut parts = drawn(named, (shape, mesh, look), &mut scenery.lost).into_iter();
             bodies.extend(parts.next());
             let carrier = carrier.map(|by| (by, Pose::identity()));
-            parts.for_each(|part| seen.add(part, carrier));
+            parts.for_each(|part| scenery.add(part, carrier));
         }
         bodies
     }
@@ -81,8 +81,8 @@ impl Scene {
     }
 
     /// The scene's scenery.
-    pub(super) fn built_scenery(&self, problems: &mut Vec<Problem>) -> Seen {
-        let (mut seen, mut others) = (Seen::default(), Vec::new());
+    pub(super) fn built_scenery(&self, problems: &mut Vec<Problem>) -> SceneryList {
+        let (mut scenery, mut others) = (SceneryList::default(), Vec::new());
         for spec in &self.spec.scenery {
             let (mesh, look) = match self.raw_mesh(&spec.shape, &spec.shape_at) {
                 Ok(read) => read,
@@ -97,17 +97,17 @@ impl Scene {
                 None => spec.pose,
             };
             let named = (spec.name.as_str(), pose, &spec.appearance);
-            let mut parts = drawn(named, (&spec.shape, mesh, look), &mut seen.lost).into_iter();
+            let mut parts = drawn(named, (&spec.shape, mesh, look), &mut scenery.lost).into_iter();
             parts
                 .next()
                 .into_iter()
-                .for_each(|part| seen.add(part, carrier));
+                .for_each(|part| scenery.add(part, carrier));
             others.extend(parts.map(|part| (part, carrier)));
         }
         others
             .into_iter()
-            .for_each(|(part, carrier)| seen.add(part, carrier));
-        seen
+            .for_each(|(part, carrier)| scenery.add(part, carrier));
+        scenery
     }
 }
 

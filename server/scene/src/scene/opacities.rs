@@ -9,9 +9,9 @@ use crate::mesh_file::{BodyTextures, RawMesh};
 /// Most bodies that one is drawn as: those beside it that move count among those that a state tells of.
 const MOST: usize = 4;
 
-/// What looks share that one body can have.
+/// What one body has alike all over: the renderer draws a body as opaque or as translucent.
 #[derive(Clone, Copy, PartialEq)]
-struct Kind {
+struct Transparency {
     opacity: f32,
     /// Its texture has an opacity of its own.
     by_texture: bool,
@@ -23,12 +23,12 @@ pub(super) fn by_opacity(body: BuiltBody) -> Vec<BuiltBody> {
     let usual = body.appearance.opacity.unwrap_or(1.0);
     let textures = body.textures.iter().flat_map(|textures| &textures.list);
     let see_through: Vec<bool> = textures.map(|one| !one.texture.is_opaque()).collect();
-    let kind = |(place, (look, _)): (usize, &(Appearance, usize))| Kind {
+    let kind = |(place, (look, _)): (usize, &(Appearance, usize))| Transparency {
         opacity: look.opacity.unwrap_or(usual),
         by_texture: texture_of(&body, place).is_some_and(|texture| see_through[texture]),
     };
-    let of_parts: Vec<Kind> = body.looks.iter().enumerate().map(kind).collect();
-    let mut kinds: Vec<(Kind, f64)> = Vec::new();
+    let of_parts: Vec<Transparency> = body.looks.iter().enumerate().map(kind).collect();
+    let mut kinds: Vec<(Transparency, f64)> = Vec::new();
     for (kind, area) in of_parts.iter().zip(areas(&body)) {
         match kinds.iter_mut().find(|(known, _)| known == kind) {
             Some((_, sum)) => *sum += area,
@@ -38,8 +38,8 @@ pub(super) fn by_opacity(body: BuiltBody) -> Vec<BuiltBody> {
     // Stable: the first of equal ones stays before.
     kinds.sort_by(|(_, a), (_, b)| b.total_cmp(a));
     kinds.truncate(MOST);
-    let nearest = |of: &Kind| {
-        let apart = |(kind, _): &(Kind, f64)| {
+    let nearest = |of: &Transparency| {
+        let apart = |(kind, _): &(Transparency, f64)| {
             f32::from(u8::from(kind.by_texture != of.by_texture))
                 + (kind.opacity - of.opacity).abs()
         };
@@ -59,7 +59,7 @@ pub(super) fn by_opacity(body: BuiltBody) -> Vec<BuiltBody> {
     }
 }
 
-fn with_opacity(body: &BuiltBody, kind: Kind) -> Appearance {
+fn with_opacity(body: &BuiltBody, kind: Transparency) -> Appearance {
     // What nobody has said stays so.
     let is_usual = body.appearance.opacity.is_none() && kind.opacity >= 1.0;
     Appearance {
@@ -86,7 +86,12 @@ fn areas(body: &BuiltBody) -> Vec<f64> {
 }
 
 /// What of a body has its looks at place `number`.
-fn part(body: &BuiltBody, kind: Kind, number: usize, of_parts: &[Option<usize>]) -> BuiltBody {
+fn part(
+    body: &BuiltBody,
+    kind: Transparency,
+    number: usize,
+    of_parts: &[Option<usize>],
+) -> BuiltBody {
     let is_in = |part: usize| of_parts[part] == Some(number);
     let of_triangles = body.looks.iter().enumerate();
     let of_triangles =

@@ -18,7 +18,7 @@ const PITCH: f64 = 0.005;
 /// How far from bones their skin may be, m.
 const MARGIN: f64 = 0.03;
 /// How far the skin that is drawn may be from where it is, m: the lattice makes three times the triangles that this needs.
-const UNSEEN: f32 = 1e-4;
+const SIMPLIFY_ERROR: f32 = 1e-4;
 /// How far bones of one finger, and those of the palm, melt into each other, m.
 const SOFT: f64 = 0.004;
 const PALM_SOFT: f64 = 0.016;
@@ -265,7 +265,7 @@ fn surface(
         let steep = slope.norm_squared().max(0.25);
         *vertex -= slope * (distance(vertex) / steep);
     }
-    reduced(&mesh.vertices, &mesh.triangles, UNSEEN)
+    reduced(&mesh.vertices, &mesh.triangles, SIMPLIFY_ERROR)
 }
 
 #[cfg(test)]
