@@ -1,7 +1,7 @@
 //! What updates cost: a committed table, from which the virtual clock draws, so that time is not free and results are the same anywhere.
 //!
-//! `taut-lab --measure` makes the table anew: every method with every tuning, case and rate once, in CPU time of the thread. Its first line names
-//! the machine. The slowest hundredth of the updates counts as the 99th percentile: what is beyond cannot be told from
+//! `taut-lab --measure` makes the table anew: every method with every tuning, case and rate once, in CPU time of the thread. What was measured before
+//! it was interrupted is kept, and rows of methods that are not measured stay as they are. Its first line names the machine. The slowest hundredth of the updates counts as the 99th percentile: what is beyond cannot be told from
 //! disturbances of the machine. A case that is not in the table is charged a whole period for each update, which is said in its row.
 
 use std::collections::HashMap;
@@ -10,11 +10,11 @@ use std::sync::OnceLock;
 
 use crate::clock::{self, Charge, RATES};
 use crate::cpu_time::quantile;
-use crate::crew;
 use crate::method::{Method, Tuning};
 use crate::provenance;
 use crate::recipe::Recipe;
 use crate::recipes::{Extent, all};
+use crate::store::{Store, recipe_key};
 
 /// The table that results follow from.
 const TABLE: &str = include_str!("../data/costs.csv");
@@ -39,6 +39,15 @@ pub struct Cost {
 }
 
 impl Cost {
+    fn from_numbers(numbers: &[f64]) -> Option<Self> {
+        let (update, force) = numbers.split_first_chunk::<3>()?;
+        let force = *force.first().filter(|_| force.len() == 1)?;
+        Some(Self {
+            update: *update,
+            force,
+        })
+    }
+
     /// Of an update at a share of all, us: the median below it, straight lines between the percentiles, the last one beyond.
     pub fn at(&self, share: f64) -> f64 {
         let [p50, p90, p99] = self.update;
@@ -99,21 +108,32 @@ fn read(table: &str) -> HashMap<String, Cost> {
         let fields: Vec<&str> = line.split(',').collect();
         let (key, numbers) = fields.split_at_checked(5)?;
         let numbers: Option<Vec<f64>> = numbers.iter().map(|n| n.parse().ok()).collect();
-        let [p50, p90, p99, force] = numbers?[..] else {
-            return None;
-        };
-        let cost = Cost {
-            update: [p50, p90, p99],
-            force,
-        };
-        Some((key.join(","), cost))
+        Some((key.join(","), Cost::from_numbers(&numbers?)?))
     };
     rows.map(|line| cost(line).unwrap_or_else(|| panic!("costs.csv: not a row of it: {line}")))
         .collect()
 }
 
-/// Runs everything once and writes the table. `done` is called after each case.
-pub fn measure(methods: &[Method], done: impl Fn(usize, usize) + Sync) -> String {
+/// Runs all of `methods` once, one after the other so that caches are not shared, and takes the rows of other methods from the table
+/// `old`. `done` is told how many recipes are done, and of how many.
+///
+/// # Errors
+///
+/// Where rows would be kept that another machine took: the two cannot be compared.
+pub fn measure(
+    methods: &[Method],
+    old: &str,
+    store: &Store,
+    done: impl Fn(usize, usize),
+) -> Result<String, String> {
+    let head = format!("# CPU time on {}", provenance::processor());
+    let measured_before = old.lines().next().unwrap_or_default();
+    let all_methods = Method::ALL.iter().all(|method| methods.contains(method));
+    if !all_methods && measured_before != head {
+        return Err(format!(
+            "the table has `{measured_before}`, this machine is `{head}`: measure all methods, without --method"
+        ));
+    }
     let mut recipes = all(Extent::Full);
     let also: Vec<Recipe> = all(Extent::Quick)
         .into_iter()
@@ -125,44 +145,70 @@ pub fn measure(methods: &[Method], done: impl Fn(usize, usize) + Sync) -> String
     recipes.extend(also);
     recipes.retain(|recipe| recipe.costs_as.is_none());
     let total = recipes.len();
-    // One at a time: caches are not shared with another case.
-    let tables = crew::map(1, &recipes, |recipe| {
-        let table = measured(recipe, methods);
-        done(total, table.lines().count());
-        table
-    });
-    let machine = provenance::processor();
-    format!("# CPU time on {machine}\n{HEAD}\n{}", tables.concat())
-}
-
-fn measured(recipe: &Recipe, methods: &[Method]) -> String {
-    let mut table = String::new();
-    let with_part = methods
-        .iter()
-        .filter(|method| (recipe.out_of_scope)(**method).is_none());
-    for method in with_part {
-        for tuning in method.tunings() {
-            for rate in RATES {
-                let period = 1.0 / f64::from(rate);
-                let (mut updates, mut forces, mut used) = (Vec::new(), Vec::new(), 0.0);
-                while updates.len() < UPDATES && used < LONGEST_US {
-                    let mut body = method.start(&recipe.scene, period, tuning);
-                    let charge = &mut Charge::WholePeriod;
-                    let left = LONGEST_US - used;
-                    let run = clock::run_within(body.as_mut(), recipe, rate, 0.5, charge, left);
-                    used += run.update_us.iter().sum::<f64>();
-                    // The first ones find nothing in the caches.
-                    updates.extend(run.update_us.iter().skip(COLD));
-                    forces.extend(run.force_us);
-                }
-                let [p50, p90, p99] = SHARES.map(|share| quantile(&updates, share));
-                let force = quantile(&forces, 0.5);
-                let key = key(recipe, *method, tuning, rate);
-                let _ = writeln!(table, "{key},{p50:.2},{p90:.2},{p99:.2},{force:.2}");
+    let mut table = format!("{head}\n{HEAD}\n");
+    for (index, recipe) in recipes.iter().enumerate() {
+        let with_part = Method::ALL
+            .into_iter()
+            .filter(|method| (recipe.out_of_scope)(*method).is_none());
+        for method in with_part {
+            if methods.contains(&method) {
+                append_measured(&mut table, recipe, method, store);
+            } else {
+                append_kept(&mut table, recipe, method, old);
             }
         }
+        done(index + 1, total);
     }
-    table
+    Ok(table)
+}
+
+fn append_kept(table: &mut String, recipe: &Recipe, method: Method, old: &str) {
+    for tuning in method.tunings() {
+        for rate in RATES {
+            let begins = format!("{},", key(recipe, method, tuning, rate));
+            let rows = old.lines().filter(|line| line.starts_with(&begins));
+            table.extend(rows.flat_map(|row| [row, "\n"]));
+        }
+    }
+}
+
+fn append_measured(table: &mut String, recipe: &Recipe, method: Method, store: &Store) {
+    for tuning in method.tunings() {
+        for rate in RATES {
+            let row = key(recipe, method, tuning, rate);
+            let cost = store.get(
+                "cost",
+                &format!("{row} {}", recipe_key(recipe)),
+                Cost::from_numbers,
+                || {
+                    let cost = cost(recipe, method, tuning, rate);
+                    (cost, [&cost.update[..], &[cost.force]].concat())
+                },
+            );
+            let ([p50, p90, p99], force) = (cost.update, cost.force);
+            let _ = writeln!(table, "{row},{p50:.2},{p90:.2},{p99:.2},{force:.2}");
+        }
+    }
+}
+
+/// Runs a case until it has shown what it takes.
+fn cost(recipe: &Recipe, method: Method, tuning: Tuning, rate: u32) -> Cost {
+    let period = 1.0 / f64::from(rate);
+    let (mut updates, mut forces, mut used) = (Vec::new(), Vec::new(), 0.0);
+    while updates.len() < UPDATES && used < LONGEST_US {
+        let mut body = method.start(&recipe.scene, period, tuning);
+        let charge = &mut Charge::WholePeriod;
+        let left = LONGEST_US - used;
+        let run = clock::run_within(body.as_mut(), recipe, rate, 0.5, charge, left);
+        used += run.update_us.iter().sum::<f64>();
+        // The first ones find nothing in the caches.
+        updates.extend(run.update_us.iter().skip(COLD));
+        forces.extend(run.force_us);
+    }
+    Cost {
+        update: SHARES.map(|share| quantile(&updates, share)),
+        force: quantile(&forces, 0.5),
+    }
 }
 
 #[cfg(test)]
@@ -180,6 +226,17 @@ mod tests {
         for (drawn, right) in drawn.iter().zip(right) {
             assert!((drawn - right).abs() < 1e-12, "{drawn}, not {right}");
         }
+    }
+
+    #[test]
+    fn rows_of_methods_that_are_not_measured_stay_as_they_are() {
+        let (_, rows) = TABLE.split_once('\n').expect("a head");
+        let of = |machine: &str| format!("# CPU time on {machine}\n{rows}");
+        let here = of(&provenance::processor());
+        let kept = measure(&[], &here, &Store::none(), |_, _| {});
+        assert!(kept.expect("a table") == here);
+        let other = measure(&[], &of("another"), &Store::none(), |_, _| {});
+        assert!(other.expect_err("two machines").contains("another"));
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! a reference answer does, 2 where the arguments are wrong or a file cannot be written.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use taut_lab::crew;
@@ -50,7 +50,7 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         return taut_lab::fidelity::command::run(std::env::args().skip(2));
     }
     if std::env::args().nth(1).as_deref() == Some("--measure") {
-        return measure(std::env::args().nth(2));
+        return measure(std::env::args().skip(2));
     }
     if std::env::args().nth(1).as_deref() == Some("papers") {
         print!("{}", papers::table(&papers::figures()));
@@ -106,18 +106,52 @@ fn measured(path: Option<String>) -> Result<ExitCode, Box<dyn Error>> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Makes the table of costs anew, at the path that is given or where it is committed.
-fn measure(path: Option<String>) -> Result<ExitCode, Box<dyn Error>> {
-    let path = path.map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/data/costs.csv")),
-        PathBuf::from,
-    );
-    let table = taut_lab::costs::measure(&Method::ALL, |total, lines| {
-        eprintln!("{lines} rows of one of {total} recipes");
-    });
+/// Makes the table of costs anew, at the path that is given or where it is committed; rows of methods that are not asked for stay.
+fn measure(mut given: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn Error>> {
+    let mut path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/data/costs.csv"));
+    let (mut methods, mut fresh) = (Vec::new(), false);
+    while let Some(argument) = given.next() {
+        match argument.as_str() {
+            "--method" => methods.push(method_named(given.next())?),
+            "--fresh" => fresh = true,
+            option if option.starts_with('-') => return Err(no_option(option).into()),
+            _ => path = argument.into(),
+        }
+    }
+    if methods.is_empty() {
+        methods.extend(Method::ALL);
+    }
+    let store = if fresh {
+        Store::none()
+    } else {
+        Store::in_directory(&Path::new(DIRECTORY).join("done"))
+    };
+    let old = std::fs::read_to_string(&path).unwrap_or_default();
+    let table = taut_lab::costs::measure(&methods, &old, &store, |done, total| {
+        eprintln!("{done} of {total} recipes");
+    })?;
     std::fs::write(&path, table)?;
     println!("{}", path.display());
+    if store.read() > 0 {
+        println!(
+            "{} rows were kept from before; --fresh measures them again",
+            store.read()
+        );
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+fn method_named(name: Option<String>) -> Result<Method, String> {
+    let name = name.ok_or("--method needs a name")?;
+    let known = Method::ALL.iter().find(|method| method.name() == name);
+    known.copied().ok_or_else(|| {
+        let all = Method::ALL.map(Method::name).join(", ");
+        format!("there is no method `{name}`; there are {all}")
+    })
+}
+
+fn no_option(option: &str) -> String {
+    format!("there is no option `{option}`; --help lists them")
 }
 
 fn help() -> String {
@@ -127,7 +161,7 @@ Runs the recipes for every method and rate; prints the table, and writes it with
 
 taut-lab [report] [OPTION...] [RECIPE...]
 taut-lab fidelity [--quick] [--held-out] [--out DIRECTORY]
-taut-lab --measure [FILE]
+taut-lab --measure [--method NAME]... [--fresh] [FILE]
 taut-lab measured [FILE]
 taut-lab papers
 
@@ -135,7 +169,7 @@ taut-lab papers
   fidelity         what the choice of a scene's settings costs, beside every setting
   measured         replays measured contact forces through every method (tests/data/measured)
   papers           each opponent on a scene of its own paper, beside what is published
-  --measure        makes the table of costs anew (tests/lab/data/costs.csv): on a quiet machine
+  --measure        makes the table of costs anew (tests/lab/data/costs.csv): on a quiet machine; of --method NAME alone where that is given
   --quick          a part of the cases
   --held-out       of fidelity: the twelve scenes whose predictions were written down before they were run; --predict prints these
   --out DIRECTORY  where files go (default: {DIRECTORY})
@@ -171,14 +205,7 @@ fn arguments(mut given: impl Iterator<Item = String>) -> Result<Arguments, Strin
                     .filter(|threads| *threads > 0)
                     .ok_or("--threads needs a number above 0")?;
             }
-            "--method" => {
-                let name = given.next().ok_or("--method needs a name")?;
-                let known = Method::ALL.iter().find(|method| method.name() == name);
-                methods.push(*known.ok_or_else(|| {
-                    let all = Method::ALL.map(Method::name).join(", ");
-                    format!("there is no method `{name}`; there are {all}")
-                })?);
-            }
+            "--method" => methods.push(method_named(given.next())?),
             "--sweep" => {
                 let name = given.next().ok_or("--sweep needs a name")?;
                 let known = SWEEPS.iter().find(|sweep| sweep.name == name);
@@ -187,9 +214,7 @@ fn arguments(mut given: impl Iterator<Item = String>) -> Result<Arguments, Strin
                     format!("there is no sweep `{name}`; there are {all}")
                 })?);
             }
-            option if option.starts_with('-') => {
-                return Err(format!("there is no option `{option}`; --help lists them"));
-            }
+            option if option.starts_with('-') => return Err(no_option(option)),
             _ => names.push(argument),
         }
     }
