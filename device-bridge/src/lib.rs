@@ -84,9 +84,9 @@ pub use plugged::{PluggedPort, plugged_ports};
 pub use plugin::{VENDOR_LIBRARIES, VendorLibrary, VendorLibraryState};
 pub use port::{
     ArmingState, Command, CommandSource, ContactBound, DevicePort, EnergyObserver, EventKind,
-    Events, MAX_EVENTS_PER_TICK, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent,
-    SafetySettings, TickReport, UNIT_TOLERANCE, ValidationSettings, fade_share, kind_of_fault,
-    within_limits,
+    Events, MAX_EVENTS_PER_TICK, Motion, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent,
+    SafetySettings, SlewLimit, Slewed, TickReport, UNIT_TOLERANCE, ValidationSettings, fade_share,
+    kind_of_fault, within_limits,
 };
 pub use report::{BridgeReport, Quantiles};
 pub use simulate::{SimulateArgs, execute_simulation};

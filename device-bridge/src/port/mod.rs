@@ -38,8 +38,10 @@ pub use device_port::{DevicePort, Reading, TickReport};
 pub use energy::EnergyObserver;
 pub(crate) use event::EdgeDetector;
 pub use event::{EventKind, Events, MAX_EVENTS_PER_TICK, SafetyEvent, kind_of_fault};
+pub use motion::Motion;
 pub use passivity::{Passivity, PassivitySettings};
 pub use settings::{ContactBound, Rearm, SafetySettings};
+pub use slew::{SlewLimit, Slewed};
 pub use validation::{UNIT_TOLERANCE, ValidationSettings};
 pub use watchdog::Command;
 

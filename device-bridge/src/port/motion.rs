@@ -20,7 +20,7 @@ const MEMORY: Duration = Duration::from_millis(20);
 
 /// Follows the device. No allocation.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Motion {
+pub struct Motion {
     velocity: Vector6<f64>,
     /// Time of the newest good sample that moved.
     sampled: Option<Duration>,
@@ -31,7 +31,7 @@ pub(super) struct Motion {
 
 impl Motion {
     /// A good sample of `time`, `travel` (displacement and angle) away from the last one. It is at least `period` later, as the validation counts.
-    pub(super) fn follow(
+    pub fn follow(
         &mut self,
         time: Duration,
         travel: &Vector6<f64>,
@@ -55,22 +55,22 @@ impl Motion {
     }
 
     /// Time goes by.
-    pub(super) fn fade(&mut self, passed: Duration) {
+    pub fn fade(&mut self, passed: Duration) {
         self.speed /= 1.0 + passed.as_secs_f64() / MEMORY.as_secs_f64();
     }
 
     /// Nothing is known of the motion any more.
-    pub(super) fn forget(&mut self) {
+    pub fn forget(&mut self) {
         *self = Self::default();
     }
 
     /// Time that the newest travel took; zero before any.
-    pub(super) fn span(&self) -> Duration {
+    pub fn span(&self) -> Duration {
         self.span
     }
 
     /// m/s.
-    pub(super) fn speed(&self) -> f64 {
+    pub fn speed(&self) -> f64 {
         self.speed
     }
 }

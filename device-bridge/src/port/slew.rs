@@ -33,13 +33,13 @@ const MOST: f64 = 4.0;
 
 /// A wrench that may follow the last one, and which limits acted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Slewed {
+pub struct Slewed {
     /// N, N m.
-    pub(super) wrench: Vector6<f64>,
+    pub wrench: Vector6<f64>,
     /// Change of the force that was asked for, where it was too large for a whole period, N.
-    pub(super) force_asked: Option<f64>,
+    pub force_asked: Option<f64>,
     /// The same for the torque, N m.
-    pub(super) torque_asked: Option<f64>,
+    pub torque_asked: Option<f64>,
 }
 
 /// How fast one part of the wrench may change.
@@ -67,7 +67,7 @@ impl Part {
 
 /// The wrench on the hand and how fast it may change. No allocation.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SlewLimit {
+pub struct SlewLimit {
     force: Part,
     torque: Part,
     period: Duration,
@@ -77,7 +77,7 @@ pub(super) struct SlewLimit {
 
 impl SlewLimit {
     /// At no force. Rates that are NaN or negative let nothing change.
-    pub(super) fn new(settings: &SafetySettings) -> Self {
+    pub fn new(settings: &SafetySettings) -> Self {
         let contact = &settings.contact;
         Self {
             force: Part {
@@ -95,17 +95,17 @@ impl SlewLimit {
     }
 
     /// What the hand feels since the last write.
-    pub(super) fn rendered(&self) -> &Vector6<f64> {
+    pub fn rendered(&self) -> &Vector6<f64> {
         &self.rendered
     }
 
     /// The hand feels nothing any more: the driver has let go.
-    pub(super) fn let_go(&mut self) {
+    pub fn let_go(&mut self) {
         self.rendered = Vector6::zeros();
     }
 
     /// Moves what is rendered towards `target`, which is finite, as far as the time since the last call and the device's `speed` allow.
-    pub(super) fn step(&mut self, now: Duration, target: &Vector6<f64>, speed: f64) -> Slewed {
+    pub fn step(&mut self, now: Duration, target: &Vector6<f64>, speed: f64) -> Slewed {
         // A clock that goes back passes no time.
         let passed = now.saturating_sub(self.last.unwrap_or(now));
         self.last = Some(self.last.map_or(now, |last| last.max(now)));

@@ -21,6 +21,7 @@ use nalgebra::Vector3;
 use crate::clock::Tick;
 use crate::cpu_time::quantile;
 use crate::felt::Felt;
+use crate::port;
 use crate::recipe::Recipe;
 
 /// Ideal forces below this have no direction to compare with, and smaller errors are not felt, N.
@@ -111,13 +112,24 @@ pub struct Measures {
 }
 
 impl Measures {
-    /// Of a run of a recipe.
+    /// Of a run of a recipe whose forces are felt as they are made.
     pub fn of(recipe: &Recipe, ticks: &[Tick]) -> Self {
+        let felt = Felt::new(ticks, &recipe.answer().wrenches, recipe.scene.arm());
+        Self::with_felt(recipe, ticks, &felt)
+    }
+
+    /// Of a run of a recipe whose forces reach the hand through the device port, as the right ones do: J is of what is felt there, and all
+    /// else of the forces as the method makes them.
+    pub(crate) fn through_port(recipe: &Recipe, ticks: &[Tick]) -> Self {
+        let mut at_hand = ticks.to_vec();
+        port::limit(&recipe.scene, &mut at_hand);
+        let felt = Felt::new(&at_hand, &port::right_answer(recipe), recipe.scene.arm());
+        Self::with_felt(recipe, ticks, &felt)
+    }
+
+    fn with_felt(recipe: &Recipe, ticks: &[Tick], felt: &Felt) -> Self {
         let ideal = &recipe.answer().wrenches;
         let errors = ForceErrors::new(ticks, ideal);
-        let body = &recipe.scene.world.body;
-        let arm = body.mesh.radius_about(&body.reference_point);
-        let felt = Felt::new(ticks, ideal, arm);
         let values = Measure::ALL
             .iter()
             .map(|measure| match measure {

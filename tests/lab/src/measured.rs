@@ -84,7 +84,7 @@ impl Measured {
                 spanned += run.spanned;
                 updates.extend(run.update_us);
                 forces.extend(run.force_us);
-                Measures::of(recipe, &run.ticks)
+                Measures::through_port(recipe, &run.ticks)
             })
             .collect();
         Self {

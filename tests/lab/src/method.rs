@@ -73,6 +73,12 @@ impl Scene {
         }
     }
 
+    /// Farthest point of the body from its reference point, m: what a force's torque is compared by.
+    pub(crate) fn arm(&self) -> f64 {
+        let body = &self.world.body;
+        body.mesh.radius_about(&body.reference_point)
+    }
+
     /// Translational stiffness that the hand is to feel, N/m.
     pub fn stiffness(&self) -> f64 {
         self.settings.stiffness(self.world.body.mass)
@@ -179,7 +185,10 @@ impl Method {
         };
         match self {
             Self::Ours => {
-                let fitted = on_its_way(scene.fitted(period));
+                let mut fitted = on_its_way(scene.fitted(period));
+                if let Tuning::Touching(share) = tuning {
+                    fitted.rest_distance *= share;
+                }
                 Box::new(GodObjectMethod::new(scene, &fitted))
             }
             Self::OursByDefault => Box::new(GodObjectMethod::new(scene, &by_default)),

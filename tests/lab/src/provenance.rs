@@ -74,7 +74,7 @@ fn version(name: &str) -> String {
 }
 
 /// Of the sources that the command stands in.
-fn commit() -> String {
+pub(crate) fn commit() -> String {
     let asked = Command::new("git")
         .args(["-C", env!("CARGO_MANIFEST_DIR")])
         .args(["describe", "--always", "--dirty", "--abbrev=12"])

@@ -11,8 +11,8 @@ use crate::method::{Method, Scene};
 use crate::reference::{self, Answer};
 
 /// Error that a scene may spend at the 95th percentile, in just-noticeable differences, and share of the time above one of them.
-const JND_BUDGET: f64 = 0.5;
-const JND_SHARE: f64 = 0.01;
+pub(crate) const JND_BUDGET: f64 = 0.5;
+pub(crate) const JND_SHARE: f64 = 0.01;
 
 /// A limit for a measure, over all start phases.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -16,7 +16,7 @@ use crate::score::{Score, scores};
 use crate::store::Store;
 use crate::study::Study;
 use crate::sweeps::{self, Point, Sweep};
-use crate::{chart, maps, overview, page, reasons, report};
+use crate::{chart, figures, maps, overview, page, reasons, report};
 
 /// The rate at which this project's method must pass every recipe, Hz.
 pub const OWN_RATE: u32 = 1000;
@@ -63,6 +63,8 @@ pub struct Results {
     pub sweeps: Vec<(Sweep, Vec<Point>)>,
     /// Points of the stability maps.
     pub maps: Vec<maps::Point>,
+    /// What the port takes from the right answer of each recipe.
+    pub port: Vec<figures::PortError>,
     /// Forces over time in some recipes.
     pub traces: Vec<Trace>,
     /// What each recipe and study is about: name, text.
@@ -152,6 +154,7 @@ impl Plan {
         let abouts = studies.iter().map(|study| (study.name, study.about));
         results.about.extend(abouts);
         results.scores = scores(&wanted, &results.outcomes, &Method::SIX_DEGREES);
+        results.port = figures::port_errors(&wanted);
         let mut rest = results.outcomes.as_slice();
         for recipe in wanted {
             let (its, others) = rest.split_at(runs(&&recipe));
@@ -190,6 +193,7 @@ impl Results {
             chart::write(&self.rows, &self.outcomes, directory)?;
             overview::write(&self.rows, &self.outcomes, directory)?;
             reasons::write(&self.scores, directory)?;
+            figures::write(&self.scores, &self.outcomes, &self.port, directory)?;
             if !self.traces.is_empty() {
                 std::fs::write(directory.join("traces.csv"), traces::csv(&self.traces))?;
             }

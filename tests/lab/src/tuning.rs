@@ -14,6 +14,8 @@ const TOUCHING_AHEAD: [f64; 3] = [1.0, 25.0, 400.0];
 const STEPS_AHEAD: [u32; 2] = [1, 10];
 /// Share of the way to the device that a body which looks ahead is tried with beside the default, k_s: that of the published method.
 const SHORTER_WAY: f64 = 0.5;
+/// Rest distance over the default that this project's method is tried with: a long body rests far from what it touches.
+const NEARER: f64 = 0.25;
 /// Inertias and damping ratios that are tried for virtual coupling. Less inertia than none there is not: the proxy is where the spring is at rest.
 pub(crate) const PROXIES: [(f64, f64); 6] = [
     (0.02, 1.0),
@@ -36,7 +38,11 @@ impl Method {
     pub fn tunings(self) -> Vec<Tuning> {
         match self {
             Self::OursByDefault | Self::DoesNothing | Self::RandomForce => vec![Tuning::Default],
-            Self::Ours => vec![Tuning::Default, Tuning::Way(SHORTER_WAY)],
+            Self::Ours => vec![
+                Tuning::Default,
+                Tuning::Way(SHORTER_WAY),
+                Tuning::Touching(NEARER),
+            ],
             Self::Paper | Self::PaperAdapted => {
                 let farthest = Tuning::Touching(TOUCHING_FARTHEST);
                 touching().chain([farthest]).collect()
@@ -89,7 +95,7 @@ pub enum Tuning {
     Default,
     /// Share of the way to the device that the body covers in an update, k_s, at the same stiffness.
     Way(f64),
-    /// Rest distance of the paper's god-object, over the default; contacts within two of them touch.
+    /// Rest distance of a god-object over the default; contacts within two of them touch.
     Touching(f64),
     /// Discrete detection that looks as far ahead as this project's method does.
     Ahead {

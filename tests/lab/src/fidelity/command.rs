@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::sweep::{BUDGET, Measured, Swept, sweep};
-use super::{held_out, scenes};
+use super::{held_out, picture, scenes};
 
 /// Runs every scene. Exit code 1 where a choice is over the budget although some setting is within it.
 pub fn run(arguments: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn Error>> {
@@ -36,6 +36,7 @@ pub fn run(arguments: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn 
     fs::write(directory.join("fidelity.csv"), every_setting(&swept))?;
     fs::write(directory.join("fidelity_choice.csv"), choices(&swept))?;
     fs::write(directory.join("fidelity_time.csv"), within_times(&swept))?;
+    fs::write(directory.join("fidelity.svg"), picture::svg(&swept)?)?;
     print!("{}", table(&swept));
     println!("files in {}", directory.display());
     let missed = swept

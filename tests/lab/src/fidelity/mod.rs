@@ -7,10 +7,12 @@
 //! - [`held_out`]: scenes whose predictions were written down before they were run.
 //! - [`counted`]: the method with its work counted: the cost depends on no clock.
 //! - [`sweep`]: every setting run, and the verdict.
+//! - [`picture`]: the choice of each scene among all settings, drawn.
 //! - [`command`]: the command.
 
 pub mod command;
 pub mod counted;
 pub mod held_out;
+pub mod picture;
 pub mod scenes;
 pub mod sweep;

@@ -18,6 +18,7 @@ use crate::measured::judged;
 use crate::method::Method;
 use crate::outcome::Outcome;
 use crate::plot::PANEL;
+use crate::port;
 use crate::recipe::Recipe;
 use crate::report::quoted;
 
@@ -122,7 +123,7 @@ pub(crate) fn run(recipes: &[Recipe], outcomes: &[Outcome]) -> Vec<Trace> {
             method: None,
             settings: String::new(),
             phase,
-            samples: samples(&mut recipe.answer().wrenches.iter().copied()),
+            samples: samples(&mut port::right_answer(recipe).into_iter()),
         });
         for outcome in its {
             let period = 1.0 / f64::from(window.rate);
@@ -132,7 +133,8 @@ pub(crate) fn run(recipes: &[Recipe], outcomes: &[Outcome]) -> Vec<Trace> {
             let cost = costs::of(recipe, by, with, rate);
             let seed = costs::seed(recipe, by, with, rate, begin);
             let mut charge = cost.map_or(Charge::WholePeriod, |cost| Charge::Drawn(cost, seed));
-            let run = clock::run(method.as_mut(), recipe, rate, begin, &mut charge);
+            let mut run = clock::run(method.as_mut(), recipe, rate, begin, &mut charge);
+            port::limit(&recipe.scene, &mut run.ticks);
             traces.push(Trace {
                 window: index,
                 method: Some(outcome.method),

@@ -1,0 +1,115 @@
+//! What a scene needs, in one picture: for each scene every setting by its cost, the cheapest that is within the budget, and what the scene chose.
+
+use std::error::Error;
+
+use plotters::prelude::*;
+
+use super::sweep::{BUDGET, Swept};
+
+/// Pixels: width, a scene's line, head and foot, the column of names, the column of ratios.
+const WIDTH: i32 = 960;
+const LINE: i32 = 34;
+const HEAD: i32 = 104;
+const FOOT: i32 = 46;
+const NAMES: i32 = 190;
+const RATIOS: i32 = 130;
+const OVER: RGBColor = RGBColor(214, 150, 150);
+const WITHIN: RGBColor = RGBColor(120, 170, 120);
+const CHOSEN: RGBColor = RGBColor(0, 90, 170);
+const GREY: RGBColor = RGBColor(225, 225, 225);
+
+/// Costs at the ends of the axis, whole powers of ten.
+fn ends(swept: &[Swept]) -> [f64; 2] {
+    let costs = || swept.iter().flat_map(|s| s.all.iter().map(|m| m.cost));
+    let least = costs().fold(f64::INFINITY, f64::min).log10().floor();
+    let most = costs().fold(1.0, f64::max).log10().ceil();
+    [least, most.max(least + 1.0)]
+}
+
+/// The picture as a text; a row for each scene.
+pub fn svg(swept: &[Swept]) -> Result<String, Box<dyn Error>> {
+    let height = HEAD + FOOT + LINE * swept.len() as i32;
+    let mut text = String::new();
+    let root =
+        SVGBackend::with_string(&mut text, (WIDTH as u32, height as u32)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let write = |text: &str, at: (i32, i32), size: i32, ink: RGBColor| {
+        root.draw(&Text::new(
+            text.to_owned(),
+            at,
+            ("sans-serif", size).into_font().color(&ink),
+        ))
+    };
+    let [least, most] = ends(swept);
+    let place = |cost: f64| {
+        let share = (cost.log10() - least) / (most - least);
+        NAMES + (share * f64::from(WIDTH - NAMES - RATIOS)) as i32
+    };
+    write(
+        &format!("What a scene needs: cost of every setting, error within J = {BUDGET} or not"),
+        (16, 8),
+        19,
+        BLACK,
+    )?;
+    for (x, ink, said) in [
+        (16, OVER, "over the budget"),
+        (156, WITHIN, "within it"),
+        (256, BLACK, "the cheapest within it"),
+        (436, CHOSEN, "what the scene chose by itself"),
+    ] {
+        root.draw(&Circle::new((x + 6, 48), 5, ink.filled()))?;
+        write(said, (x + 16, 40), 14, BLACK)?;
+    }
+    write(
+        "chosen over cheapest",
+        (WIDTH - RATIOS - 10, HEAD - 26),
+        13,
+        BLACK,
+    )?;
+    for decade in least as i32..=most as i32 {
+        let x = place(10_f64.powi(decade));
+        let line = vec![(x, HEAD - 8), (x, height - FOOT + 4)];
+        root.draw(&PathElement::new(line, GREY.stroke_width(1)))?;
+        write(
+            &format!("{:.0}", 10_f64.powi(decade)),
+            (x - 12, height - FOOT + 8),
+            13,
+            BLACK,
+        )?;
+    }
+    write(
+        "cost, nominal microseconds of the god-object loop a second",
+        (NAMES, height - 20),
+        14,
+        BLACK,
+    )?;
+    for (index, s) in swept.iter().enumerate() {
+        let y = HEAD + LINE * index as i32 + LINE / 2;
+        write(s.name, (16, y - 8), 14, BLACK)?;
+        // Those within lie above the line, the others below it.
+        for setting in &s.all {
+            let (up, ink) = if setting.j <= BUDGET {
+                (-6, WITHIN)
+            } else {
+                (6, OVER)
+            };
+            let dot = Circle::new((place(setting.cost), y + up), 3, ink.filled());
+            root.draw(&dot)?;
+        }
+        if let Some(best) = s.cheapest() {
+            root.draw(&Circle::new((place(best.cost), y - 6), 5, BLACK.filled()))?;
+        }
+        let up = if s.is_within() { -6 } else { 6 };
+        let ring = Circle::new((place(s.auto.cost), y + up), 8, CHOSEN.stroke_width(2));
+        root.draw(&ring)?;
+        let said = match (s.is_within(), s.ratio()) {
+            (true, Some(ratio)) => format!("{ratio:.2}"),
+            (false, Some(_)) => "over the budget".to_owned(),
+            (_, None) => "none is within".to_owned(),
+        };
+        write(&said, (WIDTH - RATIOS + 10, y - 8), 14, BLACK)?;
+    }
+    root.present()?;
+    drop(root);
+    Ok(text)
+}
