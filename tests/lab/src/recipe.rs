@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use god_object::{Pose, Vector6};
 use taut_method_tests::checker::PenetrationChecker;
 
-use crate::clock::{RATES, TICK, Tick};
+use crate::clock::{TICK, Tick};
 use crate::measure::Measure;
 use crate::method::{Method, Scene};
 use crate::reference::{self, Answer};
@@ -85,19 +85,29 @@ impl Ideal {
     }
 }
 
-/// The same line at every rate, with this project's settings fitted or not.
-pub(crate) fn open_everywhere(key: &'static str, reason: &'static str) -> Vec<Open> {
-    let ours = [Method::Ours, Method::OursByDefault];
-    let each = ours
-        .into_iter()
-        .flat_map(|method| RATES.map(|rate| (method, rate)));
-    each.map(|(method, rate)| Open {
+/// This project's method, with its settings fitted and not.
+pub(crate) const OURS: &[Method] = &[Method::Ours, Method::OursByDefault];
+
+/// Why a force that ends may miss a line of what is felt.
+pub(crate) const STANDS_ASIDE: &str = "the force ends up to an update after the right answer's; the port lets both down at the same rate, so they stay apart while they fall";
+
+/// The same line for each of these methods at each of these rates, Hz.
+pub(crate) fn open_for(
+    methods: &[Method],
+    rates: &[u32],
+    key: &'static str,
+    reason: &'static str,
+) -> Vec<Open> {
+    let of = |method: &Method, rate: &u32| Open {
         key,
-        method,
-        rate,
+        method: *method,
+        rate: *rate,
         reason,
-    })
-    .collect()
+    };
+    methods
+        .iter()
+        .flat_map(|method| rates.iter().map(move |rate| of(method, rate)))
+        .collect()
 }
 
 /// A pass line that this project's method does not keep, said openly: it is shown with its figure and is not a pass.

@@ -8,7 +8,7 @@ use super::bodies::{Path, ball, block, force, ghost_time, sound};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Line, OURS, Recipe, STANDS_ASIDE, open_for};
 use crate::vertex_depth::Convex;
 
 const TIP: f64 = 1e-3;
@@ -64,6 +64,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             lines.push(Line::at_most(Measure::FalseForce, push));
             lines
         }),
+        open: open_for(OURS, &[300], Measure::JndShare.key(), STANDS_ASIDE),
         ..Recipe::new(
             ("R13", "end of a plate".into()),
             "ghost plane: no force past the end",

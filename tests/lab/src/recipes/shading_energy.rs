@@ -14,7 +14,7 @@ use super::prism::Prism;
 use crate::clock::Tick;
 use crate::measure::{JND_MAGNITUDE, Measure};
 use crate::method::{Method, Scene};
-use crate::recipe::{Ideal, Probe, Recipe, open_everywhere};
+use crate::recipe::{Ideal, OURS, Probe, Recipe, open_for};
 
 const RADIUS: f64 = 0.02;
 const TIP: f64 = 2e-3;
@@ -124,12 +124,10 @@ fn recipe(extent: Extent, shaded: bool) -> Recipe {
         open: if shaded {
             Vec::new()
         } else {
-            let mut open = open_everywhere(
-                Measure::JndP95.key(),
-                "the force turns by 11 degrees at a corner, an update after the right answer does; there is a corner in 19 ms",
-            );
-            open.retain(|open| open.rate != 1000);
-            open
+            let reason = "the force turns by 11 degrees at a corner, an update after the right answer does; there is a corner in 19 ms";
+            let lines = [Measure::JndP95, Measure::JndShare].map(Measure::key);
+            let open = lines.map(|line| open_for(OURS, &[70, 300], line, reason));
+            open.concat()
         },
         out_of_scope: if shaded {
             |method| match method {

@@ -7,9 +7,10 @@ use taut_scene::shapes::{Axis, cuboid, cylinder};
 
 use super::Extent;
 use super::bodies::{sound, turns};
+use crate::clock::RATES;
 use crate::measure::Measure;
-use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe, open_everywhere};
+use crate::method::{Method, Scene};
+use crate::recipe::{Ideal, Line, Recipe, open_for};
 
 /// Of the bar, m.
 const HALF: [f64; 3] = [0.1, 1e-3, 1e-3];
@@ -86,9 +87,11 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             lines.push(Line::at_most(Measure::Astray, ASTRAY));
             lines
         }),
-        open: open_everywhere(
+        open: open_for(
+            &[Method::OursByDefault],
+            &RATES,
             Measure::Astray.key(),
-            "it comes to rest at its rest distance, which grows with the body: 20 um for one of 0.2 m",
+            "by default it comes to rest at a distance that grows with the body: 20 um for one of 0.2 m",
         ),
         out_of_scope: turns,
         ..Recipe::new(case, about, scene, duration, device)

@@ -9,7 +9,7 @@ use super::bodies::{Path, ball, force, ghost_time, sound};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Line, OURS, Recipe, STANDS_ASIDE, open_for};
 
 const RADIUS: f64 = 4e-3;
 /// Inner and outer face of the walls, and their upper end, m.
@@ -81,6 +81,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             lines.push(Line::at_most(Measure::FalseForce, late));
             lines
         }),
+        open: open_for(OURS, &[300], Measure::JndShare.key(), STANDS_ASIDE),
         ..Recipe::new(
             ("R28", "wall of a U".into()),
             "wrong side: the body stays on its side until the way is free",
