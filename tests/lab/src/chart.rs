@@ -36,7 +36,9 @@ const CANONICAL: [(&str, &str); 10] = [
 ];
 const CANONICAL_COLUMNS: usize = 2;
 /// Height of title and legend, pixels.
-const CANONICAL_HEAD: u32 = 112;
+const CANONICAL_HEAD: u32 = 134;
+/// Methods in a line of the legend of `speed-accuracy.svg`.
+const LEGEND_COLUMNS: usize = 6;
 /// Sizes of points, by rate.
 const SIZES: [i32; 3] = [7, 5, 3];
 
@@ -49,6 +51,9 @@ pub(crate) fn colour(method: Method) -> RGBColor {
         Method::VirtualCoupling => RGBColor(0, 130, 80),
         Method::Penalty => RGBColor(110, 110, 60),
         Method::Discrete => RGBColor(140, 60, 150),
+        Method::StaticCoupling => RGBColor(0, 160, 180),
+        Method::LinearisedPenalty => RGBColor(125, 75, 40),
+        Method::TwoRateLcp => RGBColor(235, 105, 165),
         Method::Point => RGBColor(190, 40, 70),
         Method::DoesNothing | Method::RandomForce => BLACK,
     }
@@ -188,14 +193,14 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
     let panels = panels(outcomes);
     let lines = panels.len().div_ceil(COLUMNS).max(1);
     let svg = directory.join("speed-accuracy.svg");
-    let size = (PANEL.0 * COLUMNS as u32, PANEL.1 * lines as u32 + 90);
+    let size = (PANEL.0 * COLUMNS as u32, PANEL.1 * lines as u32 + 112);
     let root = SVGBackend::new(&svg, size).into_drawing_area();
     root.fill(&WHITE)?;
     let root = root.titled(
         "Error felt against the share of one core that a method takes",
         ("sans-serif", 22),
     )?;
-    let (legend, grid) = root.split_vertically(50);
+    let (legend, grid) = root.split_vertically(72);
     draw_legend(&legend)?;
     let mut csv = format!("panel,{KEYS},held_hz,j_p95,core_share,on_front,j_p95_luckiest_phase\n");
     for (index, (area, panel)) in grid
@@ -232,12 +237,14 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
 }
 
 fn draw_legend(area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), Box<dyn Error>> {
-    let mut x = 30;
-    for method in Method::ALL {
-        area.draw(&Circle::new((x, 16), 6, colour(method).filled()))?;
-        area.draw(&Text::new(method.name(), (x + 12, 9), ("sans-serif", 16)))?;
-        x += 145;
+    for (index, method) in Method::ALL.into_iter().enumerate() {
+        let (column, line) = (index % LEGEND_COLUMNS, index / LEGEND_COLUMNS);
+        let (x, y) = (30 + 160 * column as i32, 16 + 20 * line as i32);
+        let name = Text::new(method.name(), (x + 12, y - 7), ("sans-serif", 16));
+        area.draw(&Circle::new((x, y), 6, colour(method).filled()))?;
+        area.draw(&name)?;
     }
+    let mut x = 30 + 160 * LEGEND_COLUMNS as i32;
     for (rate, size) in RATES.iter().zip(SIZES) {
         area.draw(&Circle::new((x, 16), size, BLACK))?;
         let label = format!("{rate} Hz");
@@ -245,6 +252,6 @@ fn draw_legend(area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), Box<dyn 
         x += 80;
     }
     let note = "grey: J = 1 and a whole core; black: Pareto front; cross: a pass line is missed; J below 0.001 is drawn at 0.001";
-    area.draw(&Text::new(note, (24, 32), ("sans-serif", 14)))?;
+    area.draw(&Text::new(note, (24, 52), ("sans-serif", 14)))?;
     Ok(())
 }

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use god_object::{Pose, Settings, Vector6, World};
 
 use crate::methods::{
-    Control, Discrete, GodObjectMethod, Penalty, PointGodObject, VirtualCoupling,
+    Control, Discrete, GodObjectMethod, LinearisedPenalty, Penalty, PointGodObject, StaticCoupling,
+    TwoRateLcp, VirtualCoupling,
 };
+pub use crate::tuning::{LinearContacts, ShellForce, ShellPoints, Tuning};
 use crate::tuning::{PROXIES, SHELL_SPACINGS, TOUCH_SHARES};
-pub use crate::tuning::{ShellForce, Tuning};
 
 /// Share of the time between updates that this project's method may spend on looking ahead, and what a pair of triangles takes, nominally, s
 /// ([`Work`](god_object::collision::Work)).
@@ -112,6 +113,12 @@ pub enum Method {
     Discrete,
     /// Points of the body pushed out of the obstacles.
     Penalty,
+    /// A point shell that penalty pushes out, where it balances with a saturating spring to the device.
+    StaticCoupling,
+    /// A dynamic body on a spring and damper, integrated implicitly for each force against linearised penalty contacts.
+    LinearisedPenalty,
+    /// The complementarity problem of contacts by proximity, solved anew for each force.
+    TwoRateLcp,
     /// A god-object of three degrees of freedom: the body moves, held by up to three planes, and never turns.
     Point,
     /// A control: the body never moves, and there is no force.
@@ -122,7 +129,7 @@ pub enum Method {
 
 impl Method {
     /// In the order of the tables.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 11] = [
         Self::Ours,
         Self::OursByDefault,
         Self::Paper,
@@ -130,11 +137,14 @@ impl Method {
         Self::VirtualCoupling,
         Self::Discrete,
         Self::Penalty,
+        Self::StaticCoupling,
+        Self::LinearisedPenalty,
+        Self::TwoRateLcp,
         Self::Point,
     ];
 
     /// Those that turn their body: a case that they all have a part in is common.
-    pub const SIX_DEGREES: [Self; 7] = [
+    pub const SIX_DEGREES: [Self; 10] = [
         Self::Ours,
         Self::OursByDefault,
         Self::Paper,
@@ -142,6 +152,9 @@ impl Method {
         Self::VirtualCoupling,
         Self::Discrete,
         Self::Penalty,
+        Self::StaticCoupling,
+        Self::LinearisedPenalty,
+        Self::TwoRateLcp,
     ];
 
     /// They are no methods: every recipe must fail them.
@@ -157,6 +170,9 @@ impl Method {
             Self::VirtualCoupling => "virtual coupling",
             Self::Discrete => "discrete",
             Self::Penalty => "penalty",
+            Self::StaticCoupling => "static coupling",
+            Self::LinearisedPenalty => "linearised penalty",
+            Self::TwoRateLcp => "two-rate LCP",
             Self::Point => "3-dof god-object",
             Self::DoesNothing => "does nothing",
             Self::RandomForce => "random force",
@@ -200,18 +216,7 @@ impl Method {
                 };
                 Box::new(GodObjectMethod::new(scene, &paper))
             }
-            Self::VirtualCoupling => {
-                let (share, damping_ratio, goes_on) = match tuning {
-                    Tuning::Proxy {
-                        share,
-                        damping_ratio,
-                        goes_on,
-                    } => (share, damping_ratio, goes_on),
-                    _ => (PROXIES[0].0, PROXIES[0].1, false),
-                };
-                let proxy = VirtualCoupling::new(scene, period, share, damping_ratio);
-                Box::new(if goes_on { proxy.going_on() } else { proxy })
-            }
+            Self::VirtualCoupling => Box::new(proxy(scene, period, tuning)),
             Self::Discrete => {
                 let (look_ahead_limit, max_substeps) = match tuning {
                     Tuning::Ahead { steps, .. } => (scene.settings.look_ahead_limit, steps),
@@ -231,6 +236,9 @@ impl Method {
                 Tuning::Round(force) => Penalty::round(scene, force),
                 _ => Penalty::new(scene, ShellForce::Deepest, SHELL_SPACINGS[0]),
             }),
+            Self::StaticCoupling => Box::new(StaticCoupling::new(scene, tuning)),
+            Self::LinearisedPenalty => Box::new(LinearisedPenalty::new(scene, tuning)),
+            Self::TwoRateLcp => Box::new(TwoRateLcp::new(scene, tuning)),
             Self::Point => {
                 let share = match tuning {
                     Tuning::Touch(share) => share,
@@ -240,6 +248,20 @@ impl Method {
             }
         }
     }
+}
+
+/// Virtual coupling with this tuning, or its first one.
+fn proxy(scene: &Scene, period: f64, tuning: Tuning) -> VirtualCoupling {
+    let (share, damping_ratio, goes_on) = match tuning {
+        Tuning::Proxy {
+            share,
+            damping_ratio,
+            goes_on,
+        } => (share, damping_ratio, goes_on),
+        _ => (PROXIES[0].0, PROXIES[0].1, false),
+    };
+    let proxy = VirtualCoupling::new(scene, period, share, damping_ratio);
+    if goes_on { proxy.going_on() } else { proxy }
 }
 
 #[cfg(test)]

@@ -19,8 +19,10 @@ use crate::outcome::Outcome;
 use crate::plot::front;
 use crate::row::{Row, Verdict};
 
-/// Pixels; the scatter's share of the width.
+/// Pixels: width and least height, and the height of the bars of a method with its name.
 const SIZE: (u32, u32) = (960, 500);
+const BARS: i32 = 47;
+/// The scatter's share of the width.
 const SCATTER: u32 = 590;
 const HEAD: u32 = 64;
 /// Ranges: shares of a core, just-noticeable differences.
@@ -123,7 +125,9 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
 /// The picture as a text that can stand in a page.
 pub(crate) fn svg(summaries: &[Summary]) -> Result<String, Box<dyn Error>> {
     let mut text = String::new();
-    let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+    let methods = summaries.chunk_by(|a, b| a.method == b.method).count() as u32;
+    let height = SIZE.1.max(HEAD + 50 + methods * BARS as u32);
+    let root = SVGBackend::with_string(&mut text, (SIZE.0, height)).into_drawing_area();
     root.fill(&WHITE)?;
     let (head, body) = root.split_vertically(HEAD);
     let cases = summaries.iter().map(|summary| summary.cases).max();
@@ -210,7 +214,7 @@ fn bars(
     area: &DrawingArea<SVGBackend<'_>, Shift>,
     summaries: &[Summary],
 ) -> Result<(), Box<dyn Error>> {
-    let (width, height) = area.dim_in_pixel();
+    let (width, _) = area.dim_in_pixel();
     let of_method = |method| summaries.iter().filter(move |s| s.method == method);
     let methods: Vec<Method> = Method::ALL
         .into_iter()
@@ -221,10 +225,9 @@ fn bars(
         (10, 4),
         ("sans-serif", 15),
     ))?;
-    let line = (height as i32 - 50) / methods.len().max(1) as i32;
     let (begin, end) = (10, width as i32 - 60);
     for (index, method) in methods.iter().enumerate() {
-        let top = 28 + index as i32 * line;
+        let top = 28 + index as i32 * BARS;
         let ink = colour(*method);
         area.draw(&Text::new(method.name(), (begin, top), ("sans-serif", 15)))?;
         for (place, summary) in of_method(*method).enumerate() {

@@ -30,6 +30,21 @@ pub(crate) const PROXIES: [(f64, f64); 6] = [
 pub(crate) const SHELL_SPACINGS: [f64; 2] = [0.125, f64::INFINITY];
 /// What the forces on a ball add up to that is tried: it may touch several obstacles.
 const ROUND: [ShellForce; 2] = [ShellForce::Deepest, ShellForce::Sum];
+/// Stiffness of a contact over that of the coupling, for the methods whose contacts are penalties: an implicit solution bears any.
+const CONTACT_STIFFNESSES: [f64; 2] = [1e3, 1e4];
+/// Finest spacing of the nested shell, over the body's longest side.
+const FINE_SPACING: f64 = 0.03125;
+/// Inertias and damping ratios that are tried for the tool of linearised penalty.
+const TOOLS: [(f64, f64); 5] = [
+    (0.02, 1.0),
+    (0.1, 1.0),
+    (0.02, 0.1),
+    (0.005, 0.3),
+    (0.0, 0.0),
+];
+/// Contact distances of the two-rate LCP that are tried, in rest distances, and its alarm distance, in activation distances: a tenth of the body.
+const CONTACT_DISTANCES: [f64; 3] = [1.0, 10.0, 100.0];
+const ALARM_DISTANCE: f64 = 25.0;
 /// Distances within which the point god-object counts faces as touched that are tried, in rest distances.
 pub(crate) const TOUCH_SHARES: [f64; 6] = [2.0, 10.0, 50.0, 250.0, 1000.0, 4000.0];
 
@@ -67,6 +82,17 @@ impl Method {
                 })
                 .chain(ROUND.map(Tuning::Round))
                 .collect(),
+            Self::StaticCoupling => static_couplings(),
+            Self::LinearisedPenalty => tools(),
+            Self::TwoRateLcp => CONTACT_DISTANCES
+                .iter()
+                .flat_map(|contact| {
+                    [None, Some(ALARM_DISTANCE)].map(|alarm| Tuning::Proximity {
+                        contact: *contact,
+                        alarm,
+                    })
+                })
+                .collect(),
             Self::Point => TOUCH_SHARES.map(Tuning::Touch).into(),
             Self::VirtualCoupling => PROXIES
                 .iter()
@@ -86,6 +112,45 @@ impl Method {
 fn touching() -> impl Iterator<Item = Tuning> {
     let others = TOUCHING.map(Tuning::Touching);
     [Tuning::Default].into_iter().chain(others)
+}
+
+/// As published, along the normals of the points and with a body that stands between updates; and without either, ever stiffer and finer.
+fn static_couplings() -> Vec<Tuning> {
+    let [soft, stiff] = CONTACT_STIFFNESSES;
+    let spaced = ShellPoints::Spaced(SHELL_SPACINGS[0]);
+    let fine = ShellPoints::Spaced(FINE_SPACING);
+    let tuning = |points, stiffness, own_normals, goes_on| Tuning::Static {
+        points,
+        stiffness,
+        own_normals,
+        goes_on,
+    };
+    let mut tunings = vec![
+        tuning(spaced, soft, true, false),
+        tuning(spaced, soft, true, true),
+        tuning(spaced, soft, false, false),
+        tuning(ShellPoints::Round, soft, false, false),
+    ];
+    for points in [spaced, fine, ShellPoints::Round] {
+        tunings.extend([soft, stiff].map(|stiffness| tuning(points, stiffness, false, true)));
+    }
+    tunings
+}
+
+/// As published, all contacts linear as a whole; and each by itself.
+fn tools() -> Vec<Tuning> {
+    let [soft, stiff] = CONTACT_STIFFNESSES;
+    let tuning = |(share, damping_ratio), stiffness, contacts| Tuning::Tool {
+        share,
+        damping_ratio,
+        stiffness,
+        contacts,
+    };
+    let whole = TOOLS.map(|tool| tuning(tool, soft, LinearContacts::Whole));
+    let each = TOOLS.map(|tool| tuning(tool, soft, LinearContacts::Each));
+    let lightest = TOOLS[TOOLS.len() - 2..].iter();
+    let stiffer = lightest.map(|tool| tuning(*tool, stiff, LinearContacts::Each));
+    whole.into_iter().chain(each).chain(stiffer).collect()
 }
 
 /// What is tuned of a baseline.
@@ -124,8 +189,64 @@ pub enum Tuning {
     },
     /// One point with a radius for the penalty method where the body is a ball, and else its vertices: what they add up to.
     Round(ShellForce),
+    /// A point shell on a static coupling.
+    Static {
+        /// Of the shell.
+        points: ShellPoints,
+        /// Of a contact over that of the coupling.
+        stiffness: f64,
+        /// Forces go along the normals of the points; else along the gradient of the field.
+        own_normals: bool,
+        /// Whether the balance is found again for each force.
+        goes_on: bool,
+    },
+    /// The tool of linearised penalty.
+    Tool {
+        /// Inertia over that of the body.
+        share: f64,
+        /// Damping of the coupling over critical damping.
+        damping_ratio: f64,
+        /// Of a contact over that of the coupling.
+        stiffness: f64,
+        /// What is linear between updates.
+        contacts: LinearContacts,
+    },
+    /// Contacts by proximity of the two-rate LCP.
+    Proximity {
+        /// Gap that contacts keep, in rest distances.
+        contact: f64,
+        /// Gap within which they are looked for beyond that, in activation distances; `None`: as far as the device may go.
+        alarm: Option<f64>,
+    },
     /// Distance within which the point god-object counts faces as touched, in rest distances.
     Touch(f64),
+}
+
+/// Points of a nested shell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShellPoints {
+    /// No farther from each other than this, over the body's longest side.
+    Spaced(f64),
+    /// One with a radius where the body is a ball, and else its vertices.
+    Round,
+}
+
+/// What a method keeps of its contacts between updates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinearContacts {
+    /// The wrench of all of them, a linear function.
+    Whole,
+    /// A spring of each that pushes and does not pull.
+    Each,
+}
+
+impl fmt::Display for ShellPoints {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Spaced(spacing) => write!(f, "points; spacing {spacing} of the body"),
+            Self::Round => f.write_str("a ball; else vertices"),
+        }
+    }
 }
 
 /// What the forces of all points in an obstacle add up to; each is the stiffness times its depth.
@@ -161,6 +282,41 @@ impl fmt::Display for Tuning {
                 }
             }
             Self::Round(force) => write!(f, "{force} of a ball; else of vertices"),
+            Self::Static {
+                points,
+                stiffness,
+                own_normals,
+                goes_on,
+            } => {
+                let normals = if *own_normals { "; own normals" } else { "" };
+                let goes_on = if *goes_on { "; goes on" } else { "" };
+                write!(
+                    f,
+                    "{points}; contacts {stiffness} times as stiff{normals}{goes_on}"
+                )
+            }
+            Self::Tool {
+                share,
+                damping_ratio,
+                stiffness,
+                contacts,
+            } => {
+                let linear = match contacts {
+                    LinearContacts::Whole => "linear as a whole",
+                    LinearContacts::Each => "each one-sided",
+                };
+                write!(
+                    f,
+                    "tool {share} of the body; damping ratio {damping_ratio}; contacts {stiffness} times as stiff; {linear}"
+                )
+            }
+            Self::Proximity { contact, alarm } => {
+                write!(f, "contacts keep {contact} rest distances; alarm ")?;
+                match alarm {
+                    Some(alarm) => write!(f, "{alarm} activation distances"),
+                    None => f.write_str("as far as the device goes"),
+                }
+            }
             Self::Touch(share) => write!(f, "touching within {share} rest distances"),
             Self::Touching(share) => write!(f, "{share} rest distances"),
             Self::Way(way) => write!(f, "k_s {way}"),

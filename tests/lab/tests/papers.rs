@@ -18,6 +18,9 @@ fn every_opponent_reaches_the_figures_of_its_own_paper_and_the_page_has_them() {
         Method::VirtualCoupling,
         Method::Penalty,
         Method::Point,
+        Method::StaticCoupling,
+        Method::LinearisedPenalty,
+        Method::TwoRateLcp,
     ];
     for opponent in opponents {
         let its = figures.iter().filter(|figure| figure.method == opponent);

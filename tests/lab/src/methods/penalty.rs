@@ -8,13 +8,13 @@
 
 use std::sync::Arc;
 
-use god_object::shape::{Nearest, Primitive};
+use god_object::shape::Primitive;
 use god_object::spatial::{angular, at_reference_point, linear, pose_difference, six};
-use god_object::{Obstacle, Pose, Settings, Vector6, World};
+use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Point3, Vector3};
 
 use super::contacts::limited;
-use super::shell::{DistanceField, points};
+use super::shell::{DistanceField, nearest_on_obstacle, points};
 use crate::method::{HapticMethod, Scene, ShellForce};
 
 /// Points are used from one period after their device pose to two: the device goes on as it came.
@@ -132,24 +132,6 @@ impl Penalty {
     }
 }
 
-/// The nearest of an obstacle's surface to a point that is inside, or outside and no farther away than `margin`, m; world.
-fn nearest(
-    obstacle: &Obstacle,
-    field: &DistanceField,
-    point: &Point3<f64>,
-    margin: f64,
-) -> Option<Nearest> {
-    let local = obstacle.pose.inverse_transform_point(point);
-    let found = match &obstacle.primitive {
-        Some(primitive) => Some(primitive.nearest(&local)).filter(|n| n.distance <= margin),
-        None => field.nearest(&local, margin),
-    }?;
-    Some(Nearest {
-        normal: obstacle.pose.rotation * found.normal,
-        ..found
-    })
-}
-
 impl HapticMethod for Penalty {
     fn update(&mut self, _time: f64, device: &Pose) {
         let reference = &self.world.body.reference_point;
@@ -162,7 +144,7 @@ impl HapticMethod for Penalty {
             let point = device * place.center;
             let margin = place.radius + PERIODS_AHEAD * moved;
             for (obstacle, field) in self.world.obstacles.iter().zip(&self.fields) {
-                if let Some(found) = nearest(obstacle, field, &point, margin) {
+                if let Some(found) = nearest_on_obstacle(obstacle, field, &point, margin) {
                     self.now.near.push(Near {
                         place: *place,
                         on_surface: point - found.normal * found.distance,

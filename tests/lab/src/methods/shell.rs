@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use god_object::Mesh;
 use god_object::geometry::distance::closest_on_triangle;
 use god_object::geometry::nearest_on_mesh;
 use god_object::shape::Nearest;
+use god_object::{Mesh, Obstacle};
 use nalgebra::{Point3, Vector3};
 
 /// Points of a mesh: its vertices, and more on its edges and faces, no farther than `spacing` from each other, m; infinite: none.
@@ -116,6 +116,24 @@ impl DistanceField {
 
 fn key(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
+}
+
+/// The nearest of an obstacle's surface to a point that is inside, or outside and no farther away than `margin`, m; world.
+pub(super) fn nearest_on_obstacle(
+    obstacle: &Obstacle,
+    field: &DistanceField,
+    point: &Point3<f64>,
+    margin: f64,
+) -> Option<Nearest> {
+    let local = obstacle.pose.inverse_transform_point(point);
+    let found = match &obstacle.primitive {
+        Some(primitive) => Some(primitive.nearest(&local)).filter(|n| n.distance <= margin),
+        None => field.nearest(&local, margin),
+    }?;
+    Some(Nearest {
+        normal: obstacle.pose.rotation * found.normal,
+        ..found
+    })
 }
 
 #[cfg(test)]

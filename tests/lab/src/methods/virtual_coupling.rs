@@ -128,7 +128,7 @@ impl VirtualCoupling {
 }
 
 /// Velocity of the device from its last two poses.
-fn device_velocity(last: &mut Option<(f64, Pose)>, time: f64, device: &Pose) -> Vector6 {
+pub(super) fn device_velocity(last: &mut Option<(f64, Pose)>, time: f64, device: &Pose) -> Vector6 {
     let before = last.replace((time, *device));
     match before {
         Some((then, pose)) if time > then => {

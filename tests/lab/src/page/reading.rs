@@ -26,6 +26,15 @@ fn about(method: Method) -> &'static str {
         Method::Penalty => {
             "points of the body pushed out of a signed distance, as in voxel sampling"
         }
+        Method::StaticCoupling => {
+            "Barbic and James 2008 for rigid bodies: a nested point shell in distance fields, where its penalty balances with a saturating spring to the device"
+        }
+        Method::LinearisedPenalty => {
+            "Otaduy and Lin 2006: a light dynamic tool on a spring and damper, integrated implicitly for each force against contacts that are linearised at each update"
+        }
+        Method::TwoRateLcp => {
+            "Duriez et al. 2006, Saupin et al. 2008, as in SOFA: a complementarity problem of contacts by proximity, solved again for each force"
+        }
         Method::DoesNothing | Method::RandomForce => {
             "a control: its body never moves, and its force is none or random; it must fail every recipe"
         }

@@ -5,8 +5,11 @@
 
 mod as_published;
 mod damping;
+mod linearised_penalty;
 mod penalty;
 mod point;
+mod static_coupling;
+mod two_rate_lcp;
 mod virtual_coupling;
 
 use std::fmt::Write as _;
@@ -51,7 +54,7 @@ impl Figure {
 }
 
 /// What no source that could be read says of an opponent.
-const NOT_ESTABLISHED: [(&str, &str); 3] = [
+const NOT_ESTABLISHED: [(&str, &str); 6] = [
     (
         "penalty",
         "the figures of McNeely et al. 1999 and 2006 (bound of stiffness, times, scenes): the papers could not be read",
@@ -59,6 +62,18 @@ const NOT_ESTABLISHED: [(&str, &str); 3] = [
     (
         "paper+adaptation",
         "the time over which a constraint rises in the paper's own runs",
+    ),
+    (
+        "static coupling",
+        "the figures of Barbic and James 2008 (points in a millisecond, stiffness, scenes): the paper could not be read beyond its abstract",
+    ),
+    (
+        "linearised penalty",
+        "the figures of Otaduy and Lin 2006 (times, masses, scenes): the paper could not be read beyond its abstract",
+    ),
+    (
+        "two-rate LCP",
+        "the figures of Duriez et al. 2006 and Saupin et al. 2008: the papers could not be read; parameters are those of SOFA's documentation",
     ),
     (
         "discrete",
@@ -76,6 +91,9 @@ pub fn figures() -> Vec<Figure> {
     let mut figures = point::figures(recipe("R09", "plate of 0.1 mm"));
     figures.extend(penalty::figures());
     figures.extend(virtual_coupling::figures());
+    figures.extend(static_coupling::figures());
+    figures.extend(linearised_penalty::figures());
+    figures.extend(two_rate_lcp::figures());
     let peg = recipe("R18", "in the hole, clearance 0.5 mm");
     let plane = recipe("R02", "ball on a plane");
     figures.extend(as_published::figures(peg, plane));

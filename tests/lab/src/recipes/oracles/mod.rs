@@ -169,7 +169,10 @@ pub(super) fn for_solvers(recipe: &'static str, run: impl Fn(&mut Solver) -> Vec
     for method in Method::ALL {
         let reason = match method {
             Method::Ours => continue,
-            Method::Penalty => "it projects nothing: its springs add up",
+            Method::Penalty | Method::StaticCoupling | Method::LinearisedPenalty => {
+                "it projects nothing: its springs add up"
+            }
+            Method::TwoRateLcp => "it solves its own complementarity problem",
             _ => "it projects with the solver of ours",
         };
         rows.push(Row::new(recipe, "rows given", method.name()).out_of_scope(reason));

@@ -1,0 +1,121 @@
+//! Otaduy and Lin 2006: the simulation of the tool is passive and bears small masses, and it moves at the rate of the forces, however seldom contacts
+//! are looked for.
+
+use god_object::World;
+use god_object::spatial::linear;
+
+use super::{Figure, HALF, at, damping};
+use crate::clock::TICK;
+use crate::method::{Method, Scene};
+use crate::recipes::{cube, ground};
+use crate::tuning::{LinearContacts, Tuning};
+
+/// Ticks of a swing.
+const SWINGS: [u32; 6] = [2, 4, 8, 16, 32, 64];
+/// A tool of a millionth of the body's mass: 1 mg.
+const LIGHT: f64 = 1e-6;
+/// Ticks between updates while the device slides: far fewer updates than forces.
+const SELDOM: u32 = 33;
+/// m/s, and m.
+const SPEED: f64 = 0.1;
+const DEEP: f64 = 2e-3;
+const TICKS: u32 = 600;
+
+pub(super) fn figures() -> Vec<Figure> {
+    let tool = |share, damping_ratio, contacts| Tuning::Tool {
+        share,
+        damping_ratio,
+        stiffness: 1e3,
+        contacts,
+    };
+    let most = |depth: f64| {
+        let tunings = Method::LinearisedPenalty.tunings();
+        let each = tunings.into_iter().flat_map(|tuning| {
+            let needed =
+                move |swing| damping::needed(Method::LinearisedPenalty, tuning, depth, swing);
+            SWINGS.map(move |swing| needed(swing) / bound(tuning))
+        });
+        each.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let light = tool(LIGHT, 1.0, LinearContacts::Whole);
+    let (along, across) = slid(light);
+    let figure = |of: String, published: &str, here: f64, within| Figure {
+        method: Method::LinearisedPenalty,
+        of,
+        source: "Otaduy and Lin 2006",
+        published: published.to_owned(),
+        here,
+        within,
+        unit: "",
+    };
+    let passive = |of: &str, here| {
+        figure(
+            of.to_owned(),
+            "passive: at most 1",
+            here,
+            [f64::NEG_INFINITY, 1.0 + 1e-6],
+        )
+    };
+    vec![
+        passive(
+            "damping of a device that its wall is passive on, over K T / 2 + B, every tuning, swings of 2 to 64 ms",
+            most(HALF),
+        ),
+        passive("the same where nothing is touched", most(-0.02)),
+        figure(
+            "error of the force across a plane, a tool of 1 mg that slides on it, contacts every 33 ms".to_owned(),
+            "0: a small mass is stable",
+            across,
+            [0.0, 1e-2],
+        ),
+        figure(
+            "force along it over that across it: the tool moves between updates".to_owned(),
+            "0 but for the damper's lag",
+            along,
+            [0.0, 1e-2],
+        ),
+    ]
+}
+
+/// K T / 2 + B of a tuning, N s/m.
+fn bound(tuning: Tuning) -> f64 {
+    let Tuning::Tool {
+        share,
+        damping_ratio,
+        ..
+    } = tuning
+    else {
+        panic!("{tuning}: not of linearised penalty")
+    };
+    let scene = damping::wall();
+    let inertia = share * scene.world.body.mass;
+    damping::of_spring() + 2.0 * damping_ratio * (scene.stiffness() * inertia).sqrt()
+}
+
+/// A cube slides on a plane: the largest force along it over that across it, and the largest error of that across it, from half of the way on.
+fn slid(tuning: Tuning) -> (f64, f64) {
+    let world = World {
+        body: cube(HALF),
+        obstacles: vec![ground()],
+    };
+    let scene = Scene::new(world, 2.0 * HALF, SPEED, at(HALF + 1e-4));
+    let period = f64::from(SELDOM) * TICK;
+    let mut method = Method::LinearisedPenalty.start(&scene, period, tuning);
+    let (mut along, mut error) = (0.0_f64, 0.0_f64);
+    for tick in 0..TICKS {
+        let time = f64::from(tick) * TICK;
+        let down = (2.0 * f64::from(tick) / f64::from(TICKS)).min(1.0);
+        let mut device = at(HALF + 1e-4 - down * (DEEP + 1e-4));
+        device.translation.x = SPEED * time;
+        if tick % SELDOM == 0 {
+            method.update(time, &device);
+            method.publish(time);
+        }
+        let force = linear(&method.force(time, &device));
+        if tick >= TICKS / 2 + SELDOM {
+            along = along.max(force.xy().norm() / force.z);
+            error = error.max((force.z / (DEEP * scene.stiffness()) - 1.0).abs());
+        }
+    }
+    (along, error)
+}
