@@ -7,9 +7,10 @@ use std::process::Command;
 /// What an answer of the method depends on.
 const METHOD: [&str; 1] = ["../../server/method/src"];
 /// What else a result of a recipe depends on: recipes and methods, the independent check, shapes, versions of crates.
-const LABORATORY: [&str; 5] = [
+const LABORATORY: [&str; 6] = [
     "src",
     "data/costs.csv",
+    "data/oracle",
     "../method/src",
     "../../server/scene/src",
     "../../Cargo.lock",
@@ -29,8 +30,12 @@ const SHOWS: [&str; 11] = [
     "src/sweeps",
 ];
 
+/// What an answer of the oracle depends on, beside its scene.
+const ORACLE: [&str; 1] = ["src/oracle"];
+
 fn main() {
     for (name, sources) in [
+        ("TAUT_ORACLE_SOURCES", &ORACLE[..]),
         ("TAUT_METHOD_SOURCES", &METHOD[..]),
         ("TAUT_LAB_SOURCES", &LABORATORY[..]),
     ] {

@@ -6,7 +6,8 @@
 //! - [`method`]: what a method has to do, and which there are; [`methods`]: each in a file.
 //! - [`clock`]: the virtual clock, and what it records.
 //! - [`recipe`]: what a recipe is; [`recipes`]: all of them; [`study`]: those that are no run along a path.
-//! - [`mod@reference`]: right answers for recipes without a formula, with their own error.
+//! - [`oracle`]: right answers for recipes without a formula, by a way that shares nothing with the method.
+//! - [`mod@reference`]: right answers for scenes without either, by the method itself, with their own error.
 //! - [`measure`]: errors of force, steps, energy, penetration, in units of what people feel.
 //! - [`outcome`]: a recipe run for one method at one rate, against its pass lines.
 //! - [`measured`]: what is measured of runs from every start phase; [`store`]: results that a later run need not make again.
@@ -35,6 +36,7 @@ pub mod measure;
 pub mod measured;
 pub mod method;
 pub mod methods;
+pub mod oracle;
 pub mod outcome;
 pub mod overview;
 pub mod page;

@@ -56,6 +56,10 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         print!("{}", papers::table(&papers::figures()));
         return Ok(ExitCode::SUCCESS);
     }
+    if std::env::args().nth(1).as_deref() == Some("oracle") {
+        let names: Vec<String> = std::env::args().skip(2).collect();
+        return taut_lab::oracle::command(&names);
+    }
     if std::env::args().nth(1).as_deref() == Some("measured") {
         return measured(std::env::args().nth(2));
     }
@@ -164,11 +168,13 @@ taut-lab fidelity [--quick] [--held-out] [--out DIRECTORY]
 taut-lab --measure [--method NAME]... [--fresh] [FILE]
 taut-lab measured [FILE]
 taut-lab papers
+taut-lab oracle [RECIPE...]
 
   report           adds all sweeps and maps, and writes report.html, a page of everything
   fidelity         what the choice of a scene's settings costs, beside every setting
   measured         replays measured contact forces through every method (tests/data/measured)
   papers           each opponent on a scene of its own paper, beside what is published
+  oracle           makes the tables of right answers anew (tests/lab/data/oracle), of some recipes or of all
   --measure        makes the table of costs anew (tests/lab/data/costs.csv): on a quiet machine; of --method NAME alone where that is given
   --quick          a part of the cases
   --held-out       of fidelity: the twelve scenes whose predictions were written down before they were run; --predict prints these

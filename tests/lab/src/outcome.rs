@@ -261,7 +261,7 @@ pub fn players(recipe: &Recipe, methods: &[Method]) -> Vec<(Method, u32)> {
 /// Everything about one recipe: its reference answer, what came of its [`players`], in their order, and why other methods have no part.
 pub fn recipe_rows(recipe: &Recipe, methods: &[Method], outcomes: &[Outcome]) -> Vec<Row> {
     let mut rows = Vec::new();
-    if let Ideal::Reference = recipe.ideal {
+    if let Ideal::Reference | Ideal::Oracle = recipe.ideal {
         rows.extend(reference_rows(recipe));
     }
     for method in methods.iter().copied() {
@@ -278,9 +278,13 @@ pub fn recipe_rows(recipe: &Recipe, methods: &[Method], outcomes: &[Outcome]) ->
 #[must_use]
 pub fn reference_rows(recipe: &Recipe) -> Vec<Row> {
     let answer = recipe.answer();
+    let by = match recipe.ideal {
+        Ideal::Oracle => "oracle",
+        _ => "reference",
+    };
     let row = Row {
         settings: format!("{} steps a millisecond", answer.steps),
-        ..Row::new(recipe.name, &recipe.case, "reference")
+        ..Row::new(recipe.name, &recipe.case, by)
     };
     vec![
         row.clone().at_most(

@@ -8,6 +8,7 @@ use taut_method_tests::checker::PenetrationChecker;
 use crate::clock::{TICK, Tick};
 use crate::measure::Measure;
 use crate::method::{Method, Scene};
+use crate::oracle;
 use crate::reference::{self, Answer};
 
 /// Error that a scene may spend at the 95th percentile, in just-noticeable differences, and share of the time above one of them.
@@ -72,6 +73,10 @@ impl Probe {
 pub enum Ideal {
     /// A formula: the wrench of the exact quasi-static problem at a time, s, in N and N m.
     Closed(Box<dyn Fn(f64) -> Vector6 + Send + Sync>),
+    /// A table of the independent [`oracle`](crate::oracle)'s.
+    Oracle,
+    /// A run of the same oracle, made when it is asked for.
+    Followed,
     /// A run of this project's method with fine steps, which says how far it is from its own limit: see [`mod@reference`].
     Reference,
     /// None: the recipe is judged by what must hold of any answer.
@@ -200,12 +205,14 @@ impl Recipe {
         (self.duration / TICK).round() as u32 + 1
     }
 
-    /// The right answer at every tick; a reference run is made, or read from its cache, on the first call.
+    /// The right answer at every tick; a reference run is made, or read from its cache, on the first call, and a table is read.
     pub fn answer(&self) -> &Answer {
         self.answer.get_or_init(|| match &self.ideal {
             Ideal::Closed(formula) => {
                 Answer::exact((0..self.ticks()).map(|tick| formula(f64::from(tick) * TICK)))
             }
+            Ideal::Oracle => oracle::of(self),
+            Ideal::Followed => oracle::followed(self),
             Ideal::Reference => reference::of(self),
             Ideal::None => Answer::exact(std::iter::empty()),
         })

@@ -1,4 +1,4 @@
-//! Reference answers for recipes without a formula: the method itself with fine steps, and how far from its own limit it is.
+//! Reference answers for scenes with neither a formula nor an answer of the [`oracle`](crate::oracle): the method itself with fine steps, and how far from its own limit it is.
 //!
 //! The run covers the whole difference of poses in every step (k_s = 1, the stiffness unchanged), re-linearises its rows, rests ten times
 //! nearer to the surface, has no adaptation, and makes 5, 10, 20, ... steps a millisecond until halving the step changes 95 % of
@@ -110,12 +110,17 @@ pub(crate) fn of(recipe: &Recipe) -> Answer {
         recipe.moving.is_none(),
         "{recipe:?}: no obstacle moves in a reference run; give the right answer as a formula"
     );
-    let file = directory().join(format!("{}-{}.bin", recipe.name, content(recipe)));
+    cached(recipe, &content(recipe), || converge(recipe))
+}
+
+/// The answer of a recipe that was kept under `content`, or what `make` makes, which is then kept.
+pub(crate) fn cached(recipe: &Recipe, content: &str, make: impl FnOnce() -> Answer) -> Answer {
+    let file = directory().join(format!("{}-{content}.bin", recipe.name));
     let cached = fs::read(&file)
         .ok()
         .and_then(|bytes| Answer::from_bytes(&bytes, recipe.ticks() as usize));
     cached.unwrap_or_else(|| {
-        let answer = converge(recipe);
+        let answer = make();
         // Renamed when it is whole: tests run side by side. A cache that cannot be written costs time and nothing else.
         let turn = PARTS.fetch_add(1, Ordering::Relaxed);
         let part = file.with_extension(format!("{}-{turn}.part", std::process::id()));

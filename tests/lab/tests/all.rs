@@ -4,6 +4,7 @@
 mod fidelity;
 mod identical;
 mod measured_forces;
+mod oracle;
 mod papers;
 mod quick;
 mod report;

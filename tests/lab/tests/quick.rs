@@ -47,7 +47,7 @@ fn failures(name: &str, method: Method, rate: u32) -> Vec<String> {
             let still = row.is_some_and(|row| matches!(row.verdict, Verdict::Open(_)));
             assert!(still, "{recipe:?}: {} is kept now: close it", open.key);
         }
-        if let Ideal::Reference = recipe.ideal {
+        if let Ideal::Reference | Ideal::Oracle = recipe.ideal {
             let rows = reference_rows(&recipe);
             let verdict = verdict(&rows);
             assert_eq!(verdict, "pass", "{recipe:?}: its reference");

@@ -220,7 +220,16 @@ fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
 
 /// The right wrench at every tick.
 fn answer(scene: &FidelityScene, built: &BuiltScene) -> Vec<god_object::Vector6> {
-    let ideal = scene.ideal.map_or(Ideal::Reference, Ideal::closed);
+    let rough = built
+        .world
+        .obstacles
+        .iter()
+        .any(|o| o.surface.friction > 0.0);
+    let ideal = match scene.ideal {
+        Some(formula) => Ideal::closed(formula),
+        None if rough => Ideal::Reference,
+        None => Ideal::Followed,
+    };
     let recipe = recipe(scene, built, ideal);
     let answer = recipe.answer();
     if !answer.converged() {

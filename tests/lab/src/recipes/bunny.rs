@@ -75,7 +75,7 @@ fn recipe(file: &str) -> Option<Recipe> {
     );
     let about = "free forms: approach, slide, press, twist";
     Some(Recipe {
-        ideal: Ideal::Reference,
+        ideal: Ideal::Oracle,
         lines: Box::new(|_| {
             let mut lines = sound();
             lines.push(Line::at_most(Measure::ForceP95, FORCE_ERROR));

@@ -153,7 +153,7 @@ fn tilted(extent: Extent) -> Recipe {
     let about = "tilt jam: without friction it slides out";
     let duration = begin + pull / SPEED + 0.1;
     Recipe {
-        ideal: Ideal::Reference,
+        ideal: Ideal::Oracle,
         phases: extent.choose(5, 1),
         lines: Box::new(|_| {
             let mut lines = sound();
@@ -193,7 +193,7 @@ fn inserted() -> Recipe {
     let about = "peg in hole: slid over the face, inserted, pushed to the other side";
     let duration = path.duration();
     Recipe {
-        ideal: Ideal::Reference,
+        ideal: Ideal::Oracle,
         lines: Box::new(|_| {
             let mut lines = sound();
             lines.push(Line::at_most(Measure::ForceP95, 0.1));

@@ -59,7 +59,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     let about = "fast spin: stops at first contact";
     let duration = (ANGLE + BEYOND) / SPIN + extent.choose(0.5, 0.25);
     vec![Recipe {
-        ideal: Ideal::Reference,
+        ideal: Ideal::Oracle,
         depth: Box::new(move |bar| {
             let pin = seen(bar);
             let nearest = Vector2::new(
