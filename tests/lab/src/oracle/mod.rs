@@ -1,7 +1,7 @@
 //! Right answers for recipes without a formula, by a way that shares no line with the method.
 //!
 //! The quasi-static place of rest of a frictionless rigid body on the scene's spring is followed at 20 kHz: feature pairs by brute force
-//! over what is near, each row only as far as a step of 20 um, the quadratic programme by non-negative least squares, 0.1 um from the
+//! over what is near, each row only as far as a step of 10 um, the quadratic programme by non-negative least squares, 0.1 um from the
 //! surface. Nothing of the method's collision detection, constraints, projection or coupling is used; shared are the scene (mesh, mass,
 //! limits, the law of the spring) and poses.
 //!

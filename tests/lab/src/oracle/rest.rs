@@ -50,7 +50,7 @@ impl Default for Fineness {
     fn default() -> Self {
         Self {
             clearance: 1e-7,
-            step: 2e-5,
+            step: 1e-5,
             samples: 20,
         }
     }

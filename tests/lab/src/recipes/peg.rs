@@ -28,6 +28,9 @@ const CLEARANCES: [f64; 3] = [0.5e-3, 0.1e-3, 0.05e-3];
 const OUT: f64 = 0.01;
 const OFFSET: f64 = 3e-3;
 const SPEED: f64 = 0.05;
+/// How far the peg that is brought in stays beside the plane that mirrors both parts, m. On it rounding decides to which side the peg tips
+/// at the rim, and there is no one right answer.
+const BESIDE: f64 = 1e-4;
 /// Time for a quarter turn of the offset, s.
 const TURNING: f64 = 0.5;
 /// Most that may act along the hole, N, and about it, N m.
@@ -179,7 +182,7 @@ fn tilted(extent: Extent) -> Recipe {
 /// R18: the tip on the upper face, slid over the hole, and in, a millimetre off the middle.
 fn inserted() -> Recipe {
     let top = 2.0 * HALF;
-    let at = |x: f64, y: f64| Vector3::new(x, y, 0.0);
+    let at = |x: f64, y: f64| Vector3::new(x, y, BESIDE);
     let path = Path::from(at(0.02, top + 2e-3))
         .to(at(0.02, top - 1e-3), SPEED)
         .to(at(1e-3, top - 1e-3), SPEED)
