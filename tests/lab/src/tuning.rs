@@ -35,13 +35,7 @@ const CONTACT_STIFFNESSES: [f64; 2] = [1e3, 1e4];
 /// Finest spacing of the nested shell, over the body's longest side.
 const FINE_SPACING: f64 = 0.03125;
 /// Inertias and damping ratios that are tried for the tool of linearised penalty.
-const TOOLS: [(f64, f64); 5] = [
-    (0.02, 1.0),
-    (0.1, 1.0),
-    (0.02, 0.1),
-    (0.005, 0.3),
-    (0.0, 0.0),
-];
+const TOOLS: [(f64, f64); 3] = [(0.02, 1.0), (0.005, 0.3), (0.0, 0.0)];
 /// Contact distances of the two-rate LCP that are tried, in rest distances, and its alarm distance, in activation distances: a tenth of the body.
 const CONTACT_DISTANCES: [f64; 3] = [1.0, 10.0, 100.0];
 const ALARM_DISTANCE: f64 = 25.0;
@@ -119,22 +113,23 @@ fn static_couplings() -> Vec<Tuning> {
     let [soft, stiff] = CONTACT_STIFFNESSES;
     let spaced = ShellPoints::Spaced(SHELL_SPACINGS[0]);
     let fine = ShellPoints::Spaced(FINE_SPACING);
-    let tuning = |points, stiffness, own_normals, goes_on| Tuning::Static {
+    let each = [
+        (spaced, soft, true, false),
+        (spaced, soft, false, false),
+        (ShellPoints::Round, soft, false, false),
+        (spaced, soft, false, true),
+        (spaced, stiff, false, true),
+        (fine, soft, false, true),
+        (ShellPoints::Round, soft, false, true),
+        (ShellPoints::Round, stiff, false, true),
+    ];
+    let tuning = |(points, stiffness, own_normals, goes_on)| Tuning::Static {
         points,
         stiffness,
         own_normals,
         goes_on,
     };
-    let mut tunings = vec![
-        tuning(spaced, soft, true, false),
-        tuning(spaced, soft, true, true),
-        tuning(spaced, soft, false, false),
-        tuning(ShellPoints::Round, soft, false, false),
-    ];
-    for points in [spaced, fine, ShellPoints::Round] {
-        tunings.extend([soft, stiff].map(|stiffness| tuning(points, stiffness, false, true)));
-    }
-    tunings
+    each.map(tuning).into()
 }
 
 /// As published, all contacts linear as a whole; and each by itself.
@@ -148,7 +143,7 @@ fn tools() -> Vec<Tuning> {
     };
     let whole = TOOLS.map(|tool| tuning(tool, soft, LinearContacts::Whole));
     let each = TOOLS.map(|tool| tuning(tool, soft, LinearContacts::Each));
-    let lightest = TOOLS[TOOLS.len() - 2..].iter();
+    let lightest = TOOLS[1..].iter();
     let stiffer = lightest.map(|tool| tuning(*tool, stiff, LinearContacts::Each));
     whole.into_iter().chain(each).chain(stiffer).collect()
 }
@@ -215,7 +210,7 @@ pub enum Tuning {
     Proximity {
         /// Gap that contacts keep, in rest distances.
         contact: f64,
-        /// Gap within which they are looked for beyond that, in activation distances; `None`: as far as the device may go.
+        /// Gap within which they are looked for beyond that, in activation distances; `None`: as far as device and body may go.
         alarm: Option<f64>,
     },
     /// Distance within which the point god-object counts faces as touched, in rest distances.
@@ -314,7 +309,7 @@ impl fmt::Display for Tuning {
                 write!(f, "contacts keep {contact} rest distances; alarm ")?;
                 match alarm {
                     Some(alarm) => write!(f, "{alarm} activation distances"),
-                    None => f.write_str("as far as the device goes"),
+                    None => f.write_str("as far as device and body go"),
                 }
             }
             Self::Touch(share) => write!(f, "touching within {share} rest distances"),

@@ -10,7 +10,7 @@
 //!
 //! An update looks for contacts of the tool where it is, and makes a penalty of each: a spring from an offset on. A force takes one step of backward
 //! Euler for the tool: `(mu / h^2 + beta / h + kappa) M a = M (mu v / h + beta v_h + kappa (x_h - x)) + F(a)`, F the contacts' wrench for the motion a,
-//! and renders the coupling's spring and damper.
+//! and renders the coupling's spring and damper. The spring saturates, as that of the static coupling.
 //!
 //! Source: M. A. Otaduy and M. C. Lin, "A modular haptic rendering algorithm for stable and transparent 6-DOF manipulation", IEEE Transactions on Robotics
 //! 2006. There the wrench of all contacts is linear until the next update ([`LinearContacts::Whole`]); a tuning of this file keeps each contact's
@@ -23,14 +23,14 @@ use std::sync::Arc;
 use god_object::collision::surfaces_intersect;
 use god_object::shape::Primitive;
 use god_object::spatial::{
-    advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference,
+    advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference, six,
 };
 use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Matrix6, Vector3};
 
-use super::contacts::{ContactFinder, limited};
+use super::contacts::ContactFinder;
 use super::point_shell::PointShell;
-use super::saturating_spring::mass_matrix;
+use super::saturating_spring::{mass_matrix, on_hand, scales};
 use super::settle::{Spring, settle};
 use super::tangent_plane::TangentPlane;
 use super::virtual_coupling::device_velocity;
@@ -184,11 +184,12 @@ impl LinearisedPenalty {
     /// One step of backward Euler.
     fn advance(&mut self, since: f64, difference: &Vector6, hand: &Vector6) -> Option<()> {
         let metric = (self.world.body).metric(self.settings.rotation_metric, &self.tool)?;
-        let per_length = self.share / (since * since) + self.damping / since + self.stiffness;
-        let mut matrix = mass_matrix(&metric, per_length);
-        let pull = self.velocity * (self.share / since)
-            + hand * self.damping
-            + difference * self.stiffness;
+        let rest = self.share / (since * since) + self.damping / since;
+        let spring = difference * self.stiffness;
+        let by = scales(&metric.mass_matrix_times(&spring), &self.settings);
+        let mut matrix = mass_matrix(&metric, by.map(|by| rest + by * self.stiffness));
+        let spring = six(&(linear(&spring) * by[0]), &(angular(&spring) * by[1]));
+        let pull = self.velocity * (self.share / since) + hand * self.damping + spring;
         let mut pull = metric.mass_matrix_times(&pull);
         match self.contacts {
             LinearContacts::Whole => {
@@ -250,7 +251,7 @@ impl HapticMethod for LinearisedPenalty {
         let difference = pose_difference(&device, &self.tool, &self.turn);
         let pull = difference * self.stiffness + (hand - self.velocity) * self.damping;
         match (self.world.body).metric(self.settings.rotation_metric, &self.tool) {
-            Some(metric) => limited(&-metric.mass_matrix_times(&pull), &self.settings),
+            Some(metric) => on_hand(&-metric.mass_matrix_times(&pull), &self.settings),
             None => Vector6::zeros(),
         }
     }

@@ -99,7 +99,10 @@ impl PointShell {
                 };
                 // A point of the far side of the body would push it in, one of an edge along the surface.
                 let turned = |inward: &Vector3<f64>| (pose.rotation * inward).dot(&nearest.normal);
-                if place.inward.is_some_and(|inward| turned(&inward) < LEAST_COSINE) {
+                if place
+                    .inward
+                    .is_some_and(|inward| turned(&inward) < LEAST_COSINE)
+                {
                     continue;
                 }
                 found.push(TangentPlane {
@@ -143,17 +146,22 @@ fn places(body: &Body, points: ShellPoints, own_normals: bool) -> Vec<Place> {
 fn spread(mesh: &Mesh, spacing: f64, own_normals: bool) -> Vec<Place> {
     let mut places = Vec::new();
     for triangle in 0..mesh.triangles().len() as u32 {
-        let [a, b, c] = mesh.corners(triangle);
-        let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-        let pieces = (longest / spacing).ceil().max(1.0) as u32;
-        let share = |k: u32| f64::from(k) / f64::from(pieces);
-        for i in 0..=pieces {
-            for j in 0..=pieces - i {
-                places.push(Place {
-                    center: a + (b - a) * share(i) + (c - a) * share(j),
+        let inward = own_normals.then(|| -mesh.face_normal(triangle));
+        let mut pieces = vec![mesh.corners(triangle)];
+        while let Some(corners) = pieces.pop() {
+            let length = |k: usize| (corners[(k + 1) % 3] - corners[k]).norm();
+            let longest = (0..3).fold(0, |best, k| if length(k) > length(best) { k } else { best });
+            if length(longest) > spacing {
+                // Halved along its longest edge, so that a slender one has no more points than it is long.
+                let [a, b, c] = [0, 1, 2].map(|k| corners[(longest + k) % 3]);
+                let middle = nalgebra::center(&a, &b);
+                pieces.extend([[a, middle, c], [middle, b, c]]);
+            } else {
+                places.extend(corners.map(|center| Place {
+                    center,
                     radius: 0.0,
-                    inward: own_normals.then(|| -mesh.face_normal(triangle)),
-                });
+                    inward,
+                }));
             }
         }
     }
@@ -248,7 +256,7 @@ mod tests {
     fn each_place_of_a_cube_is_one_point() {
         let (world, _) = world();
         let shell = PointShell::new(&world, ShellPoints::Spaced(0.75), false);
-        // Corners, and the middles of edges and faces: a diagonal's 1.4 sides have two pieces.
+        // Corners, and the middles of edges and faces: sides and diagonals are halved once.
         assert_eq!(shell.places.len(), 8 + 12 + 6);
     }
 }

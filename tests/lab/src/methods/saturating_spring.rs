@@ -8,27 +8,39 @@ use god_object::spatial::{angular, linear};
 use god_object::{Settings, Vector6};
 use nalgebra::Matrix6;
 
+use super::contacts::limited;
 use super::settle::{Spring, settle};
 
 /// The scale of a saturated part is found by so many solutions.
 const ROUNDS: u32 = 8;
 /// Change of a scale that is none.
 const SAME: f64 = 1e-6;
+/// N and N m: poses of a metre are rounded to 1e-16 of it, and springs have some thousand newtons to a metre.
+const ROUNDING: f64 = 1e-12;
 
-/// `M` times a number, as a matrix.
-pub(super) fn mass_matrix(metric: &Metric, times: f64) -> Matrix6<f64> {
-    let mut matrix = Matrix6::identity() * (metric.mass() * times);
-    let inertia = metric.inertia_in_world() * times;
+/// `M`, its linear and its angular part each times a number, as a matrix.
+pub(super) fn mass_matrix(metric: &Metric, times: [f64; 2]) -> Matrix6<f64> {
+    let mut matrix = Matrix6::identity() * (metric.mass() * times[0]);
+    let inertia = metric.inertia_in_world() * times[1];
     matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia);
     matrix
 }
 
 /// What force and torque of a wrench are scaled by, so that neither is above its limit.
-fn scales(wrench: &Vector6, settings: &Settings) -> [f64; 2] {
+pub(super) fn scales(wrench: &Vector6, settings: &Settings) -> [f64; 2] {
     [
         (settings.force_limit / linear(wrench).norm()).min(1.0),
         (settings.torque_limit / angular(wrench).norm()).min(1.0),
     ]
+}
+
+/// The force on the hand of a wrench: limited, and none where it is rounding of the poses.
+pub(super) fn on_hand(wrench: &Vector6, settings: &Settings) -> Vector6 {
+    // False for NaN, which has to be seen.
+    if wrench.iter().all(|x| x.abs() < ROUNDING) {
+        return Vector6::zeros();
+    }
+    limited(wrench, settings)
 }
 
 /// The motion after which the spring to a hand that is `difference` away and the springs of the contacts balance.

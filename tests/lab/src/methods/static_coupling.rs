@@ -17,9 +17,8 @@ use god_object::spatial::{
 use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Matrix6, Vector3};
 
-use super::contacts::limited;
 use super::point_shell::PointShell;
-use super::saturating_spring::{balance, mass_matrix};
+use super::saturating_spring::{balance, mass_matrix, on_hand};
 use super::settle::Spring;
 use super::tangent_plane::TangentPlane;
 use crate::method::{HapticMethod, Method, Scene};
@@ -113,7 +112,8 @@ impl StaticCoupling {
     /// Stiffness of the coupling at a pose of the reference point.
     fn coupling(&self, at: &Pose) -> Option<Matrix6<f64>> {
         let metric = (self.world.body).metric(self.settings.rotation_metric, at)?;
-        Some(mass_matrix(&metric, self.settings.k_h * self.settings.k_s))
+        let per_mass = self.settings.k_h * self.settings.k_s;
+        Some(mass_matrix(&metric, [per_mass; 2]))
     }
 }
 
@@ -197,7 +197,7 @@ impl HapticMethod for StaticCoupling {
             let found = motion_from(from, &difference, &coupling, method, &mut self.springs);
             motion = found.unwrap_or(motion);
         }
-        limited(&(coupling * (motion - difference)), &self.settings)
+        on_hand(&(coupling * (motion - difference)), &self.settings)
     }
 
     fn pose(&self) -> Pose {

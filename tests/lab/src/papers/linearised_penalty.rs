@@ -14,6 +14,8 @@ use crate::tuning::{LinearContacts, Tuning};
 const SWINGS: [u32; 6] = [2, 4, 8, 16, 32, 64];
 /// A tool of a millionth of the body's mass: 1 mg.
 const LIGHT: f64 = 1e-6;
+/// Of a contact over that of the coupling.
+const RATIO: f64 = 1e3;
 /// Ticks between updates while the device slides: far fewer updates than forces.
 const SELDOM: u32 = 33;
 /// m/s, and m.
@@ -25,7 +27,7 @@ pub(super) fn figures() -> Vec<Figure> {
     let tool = |share, damping_ratio, contacts| Tuning::Tool {
         share,
         damping_ratio,
-        stiffness: 1e3,
+        stiffness: RATIO,
         contacts,
     };
     let most = |depth: f64| {
@@ -64,9 +66,9 @@ pub(super) fn figures() -> Vec<Figure> {
         passive("the same where nothing is touched", most(-0.02)),
         figure(
             "error of the force across a plane, a tool of 1 mg that slides on it, contacts every 33 ms".to_owned(),
-            "0: a small mass is stable",
+            "a small mass is stable: at most the offset of the contacts",
             across,
-            [0.0, 1e-2],
+            [0.0, offset() / DEEP],
         ),
         figure(
             "force along it over that across it: the tool moves between updates".to_owned(),
@@ -90,6 +92,12 @@ fn bound(tuning: Tuning) -> f64 {
     let scene = damping::wall();
     let inertia = share * scene.world.body.mass;
     damping::of_spring() + 2.0 * damping_ratio * (scene.stiffness() * inertia).sqrt()
+}
+
+/// Gap at which a contact begins to push, m.
+fn offset() -> f64 {
+    let scene = damping::wall();
+    scene.settings.force_limit / (RATIO * scene.stiffness())
 }
 
 /// A cube slides on a plane: the largest force along it over that across it, and the largest error of that across it, from half of the way on.
