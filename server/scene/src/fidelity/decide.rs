@@ -1,8 +1,9 @@
 //! The cheapest settings whose predicted error is within the budget: every setting of a small grid is looked at.
 
+use super::body::BodyNeed;
 use super::cost::{triangles_within, update_us};
-use super::errors;
-use super::need::{BodyNeed, SceneNeed};
+use super::need::SceneNeed;
+use super::parts::Parts;
 
 /// Rates of updates to choose from, Hz. More than the device's rate brings nothing new.
 pub const RATES: [f64; 8] = [70.0, 100.0, 140.0, 200.0, 300.0, 500.0, 700.0, 1000.0];
@@ -48,81 +49,6 @@ impl Chosen {
     #[must_use]
     pub fn cost(&self) -> f64 {
         self.rate * self.update_us
-    }
-}
-
-/// Errors of direction, force and step, in just-noticeable differences: the parts that [`predicted`] puts together.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parts {
-    /// Turned normals of late sets.
-    pub direction: f64,
-    /// Surface off its tangent plane.
-    pub sagitta: f64,
-    /// Rows that are linear in the rotation.
-    pub linearisation: f64,
-    /// Meshes off their files.
-    pub mesh: f64,
-    /// Facets of simplified meshes.
-    pub facets: f64,
-    /// Gaps off their places.
-    pub tolerance: f64,
-    /// Obstacles that moved on.
-    pub obstacles: f64,
-    /// Steps of force from one set to the next.
-    pub step: f64,
-}
-
-impl Parts {
-    /// Of settings in a scene.
-    #[must_use]
-    pub fn of(need: &SceneNeed, rate: f64, tolerance: f64, rounds: u32, meshes: &[f64]) -> Self {
-        let lag = errors::longest_lag(need.k_s, rate);
-        let curvature = errors::parallel(need.curvature(), need.depth());
-        let way = need.speed * lag;
-        let felt = |distance: f64| errors::force_jnd(need.stiffness * distance, need.force);
-        let moved = errors::obstacle_lag(need.obstacle_speed(), rate);
-        let stepped = errors::obstacle_step(need.obstacle_speed(), rate);
-        // Both bodies of a contact are off; of the obstacles, the worst.
-        let off = meshes.first().copied().unwrap_or(0.0)
-            + meshes.iter().skip(1).copied().fold(0.0, f64::max);
-        let bodies = std::iter::once(&need.body).chain(&need.obstacles);
-        let facets = bodies
-            .zip(meshes)
-            .filter(|(_, error)| **error > 0.0)
-            .map(|(body, error)| 0.5 * errors::facet_angle(*error, body.curvature));
-        let between = need.speed / rate;
-        let (turn, own) = need.stair(between, meshes);
-        let (stiffness, force) = (need.stiffness, need.force);
-        let step = errors::set_step(
-            stiffness,
-            need.k_s,
-            force,
-            [turn, own],
-            [between, need.speed * errors::TICK],
-        );
-        Self {
-            direction: errors::direction_jnd(errors::normal_turn(curvature, way)),
-            sagitta: felt(errors::sagitta(curvature, way)),
-            linearisation: felt(errors::linearisation(
-                need.lever,
-                need.turn_rate * lag,
-                rounds,
-            )),
-            mesh: felt(off),
-            facets: errors::direction_jnd(facets.fold(0.0, f64::max)),
-            tolerance: felt(tolerance),
-            obstacles: (need.stiffness * moved
-                / (errors::JND_MAGNITUDE * errors::ramp_force(need.force)))
-            .max(need.stiffness * stepped / errors::JND_CHANGE),
-            step: errors::force_jnd(step, need.force),
-        }
-    }
-
-    /// The largest of direction, force and step; errors of force add up.
-    #[must_use]
-    pub fn j(&self) -> f64 {
-        let force = self.sagitta + self.linearisation + self.mesh + self.tolerance + self.obstacles;
-        force.max(self.direction + self.facets).max(self.step)
     }
 }
 
@@ -250,13 +176,17 @@ impl Rank {
 
 #[cfg(test)]
 mod tests {
+    use super::super::met::Met;
     use super::*;
     use god_object::Primitive;
     use nalgebra::Point3;
 
     fn sphere(radius: f64) -> BodyNeed {
         let center = Point3::origin();
-        BodyNeed::of_primitive("a", &Primitive::Sphere { center, radius })
+        let raw = crate::shapes::sphere(radius, 1);
+        let mesh = god_object::Mesh::new(raw.vertices, raw.triangles).expect("a closed shape");
+        let primitive = Primitive::Sphere { center, radius };
+        BodyNeed::of_primitive("a", &primitive, &mesh, &Met::default())
     }
 
     fn need(body: BodyNeed, obstacle: BodyNeed) -> SceneNeed {
@@ -275,20 +205,23 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_needs_the_slowest_rate_and_a_sphere_more() {
+    fn a_plane_needs_the_slowest_rate_and_a_sphere_rounds_or_more() {
         let plane = BodyNeed {
             curvature: 0.0,
             ..sphere(1.0)
         };
         let flat = decide(&need(sphere(0.02), plane), &Fixed::default(), 0.5, None);
         assert_eq!((flat.rate, flat.rounds), (RATES[0], 0));
-        let round = decide(
-            &need(sphere(0.02), sphere(0.02)),
-            &Fixed::default(),
-            0.5,
-            None,
-        );
-        assert!(round.rate > flat.rate && round.j <= 0.5);
+        let ball = need(sphere(0.02), sphere(0.02));
+        let round = decide(&ball, &Fixed::default(), 0.5, None);
+        assert!(round.cost() > flat.cost() && round.rounds > 0 && round.j <= 0.5);
+        let linear = Fixed {
+            rounds: Some(0),
+            ..Fixed::default()
+        };
+        let linear = decide(&ball, &linear, 0.5, None);
+        assert!(linear.rate > flat.rate && linear.j <= 0.5);
+        assert!(linear.cost() > round.cost());
     }
 
     #[test]

@@ -17,12 +17,12 @@
 //! **Curvature.** A tangent plane that is d late is turned by kappa d and lies kappa d^2 / 2 off the surface (the sagitta). The device goes along
 //! the parallel of the contact as deep as it presses, p = F / K; so kappa stands for kappa / (1 - kappa p) where the contact is convex.
 //!
-//! **Rows.** Rows are linear in the rotation; a point at radius r that turns by phi is r (1 - cos phi) = r phi^2 / 2 beside its row. A round of
-//! implicit constraints is a Newton step: phi <- phi^2 / 2.
+//! **Rows.** Rows are linear in the rotation; a point at radius r that turns by phi is r (1 - cos phi) = r phi^2 / 2 beside its row. Rounds of implicit
+//! constraints shorten phi: see [`rounds`](super::rounds).
 //!
 //! **Obstacles.** The row of an obstacle that moves at v is one period old when its set is published, and goes on with the obstacle from the first force
-//! that sees it: 1/f and up to a millisecond behind it, half of that in the mean. Where the obstacle stops, the row has gone on for a period at most.
-//! An error that does not grow with the force is felt most where the force is least: the 95th percentile of an even ramp is at its weakest twentieth.
+//! that sees it: 1/f and up to a millisecond behind it, half of that in the mean. Where the obstacle stops, the row has gone on for a period at most: a
+//! [`pulse`](super::ripple::pulse) until the next set comes. An error that does not grow with the force is felt most where that is small: by 0.1 N.
 //!
 //! **Steps.** When a set is replaced, the body has gone v T on. Its normals turned by theta(v T): the force of the new set points elsewhere by that, and acts
 //! from a plane that lies theta (v T / k_s + v T / 2) off the old one where the device is, and as far again as it goes in a millisecond until a force sees
@@ -34,6 +34,8 @@
 //! **Facets.** A chord that is at most e off a circle of curvature kappa spans the angle 2 acos(1 - e kappa).
 //!
 //! Thresholds: 18.4 degrees for direction (Barbagli et al. 2006); 7 % of the force (Pang, Tan, Durlach 1991), at least 0.1 N for a change.
+
+use super::rounds::left_of_turn;
 
 /// Just-noticeable angle between forces, rad.
 pub const JND_DIRECTION: f64 = 18.4 * std::f64::consts::PI / 180.0;
@@ -77,7 +79,7 @@ pub fn sagitta(curvature: f64, way: f64) -> f64 {
 /// Distance of a point at `radius`, m, from its linear row, after the body turned by `angle`, rad, and so many Newton rounds, m.
 #[must_use]
 pub fn linearisation(radius: f64, angle: f64, rounds: u32) -> f64 {
-    let left = (0..rounds).fold(angle, |angle, _| 0.5 * angle * angle);
+    let left = left_of_turn(angle, rounds);
     0.5 * radius * left * left
 }
 
@@ -119,13 +121,6 @@ pub fn facet_angle(error: f64, curvature: f64) -> f64 {
 #[must_use]
 pub fn obstacle_lag(speed: f64, rate: f64) -> f64 {
     speed * (rate.recip() + 0.5 * TICK)
-}
-
-/// The force below which a contact that is pressed evenly up to `force`, N, is for the first twentieth of what is compared, N. An error that is the same all
-/// the time is felt most there; forces below 0.1 N are not compared.
-#[must_use]
-pub fn ramp_force(force: f64) -> f64 {
-    JND_CHANGE + 0.05 * (force - JND_CHANGE).max(0.0)
 }
 
 /// Step of the row of an obstacle that stops, when the next set comes: how far the row went on, beyond what it goes in a millisecond anyway, m.
@@ -263,20 +258,6 @@ mod tests {
     fn a_force_is_felt_by_its_share_and_never_below_a_tenth_of_a_newton() {
         assert_eq!(force_jnd(0.1, 1.0), 1.0);
         assert!((force_jnd(0.1, 10.0) - 1.0 / 7.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn an_even_lag_on_an_even_ramp_is_felt_at_the_twentieth_that_is_weakest() {
-        // A lag of 1 to 2 hundredths of a newton at random over a force from 0.1 N up: the 95th percentile of the ratio.
-        let (force, lag) = (4.0, 0.01);
-        let mut ratios = Vec::new();
-        for i in 0..400 {
-            let at = JND_CHANGE + (force - JND_CHANGE) * (f64::from(i) + 0.5) / 400.0;
-            ratios.extend((0..50).map(|j| lag * (1.0 + (f64::from(j) + 0.5) / 50.0) / at));
-        }
-        ratios.sort_by(f64::total_cmp);
-        let found = ratios[ratios.len() * 95 / 100];
-        assert!((1.5 * lag / ramp_force(force) / found - 1.0).abs() < 0.1);
     }
 
     #[test]

@@ -92,7 +92,7 @@ impl FidelityPlan {
             "; NOT within the budget: allow more, or slow the hand down"
         };
         let mut lines = vec![format!(
-            "fidelity auto: budget J <= {}{time}; predicted J {:.2}, {:.0} us an update, at up to {:.3} m/s and {:.2} rad/s{verdict}",
+            "fidelity auto: budget J <= {}{time}; predicted J {:.2}, {:.0} us an update, at up to {:.3} m/s and {:.2} rad/s{verdict} (J is the error of the force over the least that people feel)",
             self.budget_j,
             self.predicted_j,
             self.predicted_update_us,

@@ -5,6 +5,7 @@ mod build;
 mod built;
 mod drawn;
 mod edit;
+mod fidelity_choices;
 mod file_faults;
 mod load;
 mod opacities;

@@ -35,10 +35,35 @@ fn without_the_key_nothing_changes() {
 #[test]
 fn a_curved_scene_is_updated_more_often_than_a_flat_one() {
     let flat = plan(&format!("fidelity = \"auto\"\n{BODY}{PLANE}"));
-    let round = plan(&format!("fidelity = \"auto\"\n{BODY}{BALL}"));
+    // Rows that are made anew for each force follow a ball at any rate.
+    let linear = "[method]\nimplicit_rounds = 0\n";
+    let round = plan(&format!("fidelity = \"auto\"\n{BODY}{BALL}{linear}"));
     assert!(flat.update_rate_hz < round.update_rate_hz);
     assert!(flat.is_within() && round.is_within());
     assert_eq!((round.budget_j, round.time_us), (0.5, None));
+    let free = plan(&format!("fidelity = \"auto\"\n{BODY}{BALL}"));
+    assert!(free.is_within() && free.update_rate_hz < round.update_rate_hz);
+}
+
+#[test]
+fn edges_count_where_the_hand_s_path_brings_the_body() {
+    let folder = tempfile::tempdir().unwrap();
+    let block = "[[obstacle]]\nname = \"a\"\nshape = { box = { half_extents = [0.05, 0.05, 0.01] } }\npose = { position = [0.0, 0.0, -0.01] }\n";
+    let rate = |hand: Option<f64>| {
+        let path = hand.map_or(String::new(), |x| {
+            let trace = format!("t,x,y,z,qw,qx,qy,qz\n0,0,0,0.02,1,0,0,0\n1,{x},0,0.02,1,0,0,0\n");
+            std::fs::write(folder.path().join("hand.csv"), trace).unwrap();
+            "[hand]\npath = \"hand.csv\"\n".to_owned()
+        });
+        let text = format!("{BODY}{block}{path}[fidelity]\nspeed = 0.1\n");
+        let built = Scene::parse("s.toml", &text, folder.path()).and_then(|scene| scene.build());
+        built.unwrap().fidelity.expect("a choice").update_rate_hz
+    };
+    let (beside, over, anywhere) = (rate(Some(0.02)), rate(Some(0.06)), rate(None));
+    assert!(
+        beside < over && beside < anywhere,
+        "{beside} {over} {anywhere}"
+    );
 }
 
 #[test]
@@ -182,7 +207,7 @@ fn check_prints_the_choice_with_its_reasons() {
     let said = reports[0].to_string();
     assert!(reports[0].fidelity.is_some());
     assert!(
-        said.contains("fidelity.update_rate") && said.contains("per m at"),
+        said.contains("fidelity.update_rate") && said.contains("between two updates"),
         "{said}"
     );
 }
