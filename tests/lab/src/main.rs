@@ -164,7 +164,7 @@ fn help() -> String {
 Runs the recipes for every method and rate; prints the table, and writes it with CSV files and charts.
 
 taut-lab [report] [OPTION...] [RECIPE...]
-taut-lab fidelity [--quick] [--held-out] [--out DIRECTORY]
+taut-lab fidelity [--quick] [--seen | --held-out | --predict | --front | --every [CASE...]] [--out DIRECTORY]
 taut-lab --measure [--method NAME]... [--fresh] [FILE]
 taut-lab measured [FILE]
 taut-lab papers
@@ -177,7 +177,9 @@ taut-lab oracle [RECIPE...]
   oracle           makes the tables of right answers anew (tests/lab/data/oracle), of some recipes or of all
   --measure        makes the table of costs anew (tests/lab/data/costs.csv): on a quiet machine; of --method NAME alone where that is given
   --quick          a part of the cases
-  --held-out       of fidelity: the twelve scenes whose predictions were written down before they were run; --predict prints these
+  --held-out       of fidelity: the twelve scenes whose predictions were written down before they were run; --predict prints these, --front
+                   runs the methods in them, and --seen the twelve scenes that were held out before
+  --every          of fidelity: the choice in every recipe with a right answer and every shipped scene
   --out DIRECTORY  where files go (default: {DIRECTORY})
   --threads N      how many at once (default: one for each core)
   --method NAME    this method only; may be repeated: {}

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use taut_lab::fidelity::command::{choices, every_setting, table};
-use taut_lab::fidelity::held_out;
+use taut_lab::fidelity::held_out::{choice, scenes as held_out};
 use taut_lab::fidelity::scenes::all;
 use taut_lab::fidelity::sweep::{Swept, sweep};
+use taut_lab::fidelity::tables::{choices, every_setting, table};
 
 /// Most cost of a choice over the cheapest setting within the budget: two steps of the grid of rates, and what the sets of the peg take that hold the faces
 /// that its corners slide over (4 %), while the cheapest of it has every row anyway.
@@ -67,10 +67,10 @@ fn what_was_predicted_of_the_held_out_scenes_still_is() {
     let files = tempfile::tempdir().expect("a temporary directory");
     let scenes = held_out::all(files.path()).expect("files can be written");
     assert_eq!(scenes.len(), 12);
-    let now = held_out::predictions(&scenes, files.path()).expect("the scenes are right");
+    let now = choice::predictions(&scenes, files.path()).expect("the scenes are right");
     assert_eq!(
         now,
-        held_out::PREDICTIONS,
+        choice::PREDICTIONS,
         "the choice has changed: its page tells what was, so run them, say so there, and hold out others"
     );
 }

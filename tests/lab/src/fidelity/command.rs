@@ -1,38 +1,109 @@
-//! `taut-lab fidelity`: the table, and the files that it is made of.
+//! `taut-lab fidelity`: what is run, and where its files go.
 
 use std::error::Error;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use super::sweep::{BUDGET, Measured, Swept, sweep};
-use super::{held_out, picture, scenes};
+use super::held_out::{choice, front, scenes as held_out};
+use super::scenes::FidelityScene;
+use super::sweep::{Swept, sweep};
+use super::tables::{choices, every_setting, table, within_times};
+use super::{every, picture, scenes, seen};
+use crate::crew;
 
-/// Runs every scene. Exit code 1 where a choice is over the budget although some setting is within it.
+/// What is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum What {
+    /// The scenes of different need.
+    Scenes,
+    /// Those that were held out once.
+    Seen,
+    /// Those that are held out: what is foretold of them.
+    Predict,
+    /// The same, run.
+    HeldOut,
+    /// The methods in them.
+    Front,
+    /// All recipes and shipped scenes.
+    Every,
+}
+
+/// Exit code 1 where a choice is over the budget although some setting is within it.
 pub fn run(arguments: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn Error>> {
     let (mut quick, mut directory) = (false, PathBuf::from("target/lab"));
-    let mut held_out = None;
+    let mut what = What::Scenes;
+    let mut names = Vec::new();
     let mut arguments = arguments;
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--quick" => quick = true,
-            "--held-out" => held_out = Some(HeldOut::Run),
-            "--predict" => held_out = Some(HeldOut::Predict),
+            "--seen" => what = What::Seen,
+            "--held-out" => what = What::HeldOut,
+            "--predict" => what = What::Predict,
+            "--front" => what = What::Front,
+            "--every" => what = What::Every,
             "--out" => directory = arguments.next().ok_or("--out needs a directory")?.into(),
-            other => return Err(format!("fidelity has no option `{other}`").into()),
+            option if option.starts_with('-') => {
+                return Err(format!("fidelity has no option `{option}`").into());
+            }
+            _ => names.push(argument),
         }
     }
     let files = directory.join("fidelity");
     fs::create_dir_all(&files)?;
-    if let Some(what) = held_out {
-        return run_held_out(&what, &files, quick);
+    match what {
+        What::Scenes => run_scenes(scenes::all(&files)?, (&files, &directory), quick),
+        What::Seen => {
+            let swept = swept(&seen::all(&files)?, &files, quick)?;
+            let (table, kept) = choice::verdict(&swept);
+            Ok(told(&table, kept, swept.len()))
+        }
+        What::Predict => {
+            print!("{}", choice::predictions(&held_out::all(&files)?, &files)?);
+            Ok(ExitCode::SUCCESS)
+        }
+        What::HeldOut => run_held_out(&files, &directory, quick),
+        What::Front => {
+            let found = front::run(&held_out::all(&files)?, &files)?;
+            fs::write(
+                directory.join("held-out-methods-found.csv"),
+                front::csv(&found),
+            )?;
+            let (table, [right, of, fronts, of_fronts]) = front::verdict(&found);
+            print!("{table}");
+            println!("{right} of {of} foretold right; the cheapest in {fronts} of {of_fronts}");
+            Ok(ExitCode::SUCCESS)
+        }
+        What::Every => {
+            let judged = every::run(&names)?;
+            fs::write(directory.join("fidelity_every.csv"), every::csv(&judged))?;
+            print!("{}", every::table(&judged));
+            let kept = judged.iter().filter(|judged| judged.is_kept()).count();
+            Ok(ExitCode::from(u8::from(kept < judged.len())))
+        }
     }
-    let mut swept = Vec::new();
-    for scene in scenes::all(&files)? {
+}
+
+fn swept(
+    scenes: &[FidelityScene],
+    files: &Path,
+    quick: bool,
+) -> Result<Vec<Swept>, taut_scene::SceneError> {
+    let swept = crew::map(crew::cores(), scenes, |scene| {
+        let swept = sweep(scene, files, quick);
         eprintln!("{}", scene.name);
-        swept.push(sweep(&scene, &files, quick)?);
-    }
+        swept
+    });
+    swept.into_iter().collect()
+}
+
+fn run_scenes(
+    scenes: Vec<FidelityScene>,
+    (files, directory): (&Path, &Path),
+    quick: bool,
+) -> Result<ExitCode, Box<dyn Error>> {
+    let swept = swept(&scenes, files, quick)?;
     fs::write(directory.join("fidelity.csv"), every_setting(&swept))?;
     fs::write(directory.join("fidelity_choice.csv"), choices(&swept))?;
     fs::write(directory.join("fidelity_time.csv"), within_times(&swept))?;
@@ -45,146 +116,20 @@ pub fn run(arguments: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn 
     Ok(ExitCode::from(u8::from(missed)))
 }
 
-/// What is done with the scenes that were held out.
-enum HeldOut {
-    /// Says what is predicted of them.
-    Predict,
-    /// Runs them, against what was committed.
-    Run,
-}
-
-/// Exit code 1 where a choice that was committed is over the budget although some setting is within it.
-fn run_held_out(what: &HeldOut, files: &Path, quick: bool) -> Result<ExitCode, Box<dyn Error>> {
+/// Against what was committed.
+fn run_held_out(files: &Path, directory: &Path, quick: bool) -> Result<ExitCode, Box<dyn Error>> {
     let scenes = held_out::all(files)?;
-    let predictions = held_out::predictions(&scenes, files)?;
-    if matches!(what, HeldOut::Predict) {
-        print!("{predictions}");
-        return Ok(ExitCode::SUCCESS);
-    }
-    if predictions != held_out::PREDICTIONS {
+    if choice::predictions(&scenes, files)? != choice::PREDICTIONS {
         return Err("the choices are not those of tests/lab/data/held-out.csv any more: what was held out has been seen, so hold out other scenes".into());
     }
-    let mut swept = Vec::new();
-    for scene in &scenes {
-        eprintln!("{}", scene.name);
-        swept.push(sweep(scene, files, quick)?);
-    }
-    let (table, kept) = held_out::verdict(&swept);
+    let swept = swept(&scenes, files, quick)?;
+    fs::write(directory.join("held-out-found.csv"), choices(&swept))?;
+    let (table, kept) = choice::verdict(&swept);
+    Ok(told(&table, kept, swept.len()))
+}
+
+fn told(table: &str, kept: usize, of: usize) -> ExitCode {
     print!("{table}");
-    println!("{kept} of {} kept", swept.len());
-    Ok(ExitCode::from(u8::from(kept < swept.len())))
-}
-
-/// The choice of each scene beside the cheapest setting within the budget.
-pub fn table(swept: &[Swept]) -> String {
-    let mut text = format!(
-        "{:<17} {:>7} {:>9} {:>6} {:>9} {:>11} {:>10} {:>9} {:>10} {:>6}  budget J <= {BUDGET}\n",
-        "scene",
-        "rate Hz",
-        "tol um",
-        "rounds",
-        "mesh um",
-        "J predicted",
-        "J measured",
-        "cost us/s",
-        "least us/s",
-        "ratio"
-    );
-    for s in swept {
-        let (auto, best) = (&s.auto, s.cheapest());
-        let number = |value: Option<f64>, places: usize| {
-            value.map_or("-".to_owned(), |v| format!("{v:.places$}"))
-        };
-        let verdict = match (s.is_within(), best) {
-            (true, _) => "within".to_owned(),
-            (false, Some(_)) => "OVER although some are within".to_owned(),
-            (false, None) => format!("over; so is every setting, least J {:.2}", s.least_error()),
-        };
-        let _ = writeln!(
-            text,
-            "{:<17} {:>7} {:>9.3} {:>6} {:>9.1} {:>11.3} {:>10.3} {:>9.0} {:>10} {:>6}  {verdict}",
-            s.name,
-            auto.setting.rate,
-            auto.setting.gap_tolerance * 1e6,
-            auto.setting.rounds,
-            auto.setting.mesh_error * 1e6,
-            s.plan.predicted_j,
-            auto.j,
-            auto.cost,
-            number(best.map(|b| b.cost), 0),
-            number(s.ratio(), 2),
-        );
-    }
-    text
-}
-
-/// CSV of the choices within a time: what was predicted and measured of them, and the least error of any setting that fast.
-pub fn within_times(swept: &[Swept]) -> String {
-    let mut text =
-        "scene,time_us,rate_hz,rounds,predicted_us,measured_us,predicted_j,j,least_j_that_fast\n"
-            .to_owned();
-    for s in swept {
-        for timed in &s.timed {
-            let (plan, auto) = (&timed.plan, &timed.auto);
-            let _ = writeln!(
-                text,
-                "{},{},{},{},{:.3},{:.3},{:.6},{:.6},{:.6}",
-                s.name,
-                timed.time_us,
-                auto.setting.rate,
-                auto.setting.rounds,
-                plan.predicted_update_us,
-                auto.update_us(),
-                plan.predicted_j,
-                auto.j,
-                s.least_error_within(timed.time_us)
-            );
-        }
-    }
-    text
-}
-
-fn fields(m: &Measured) -> String {
-    let s = &m.setting;
-    format!(
-        "{},{:e},{},{:e},{:.6},{},{:.3}",
-        s.rate,
-        s.gap_tolerance,
-        s.rounds,
-        s.mesh_error,
-        m.j,
-        m.parts.map(|part| format!("{part:.6}")).join(","),
-        m.cost
-    )
-}
-
-/// CSV of every setting.
-pub fn every_setting(swept: &[Swept]) -> String {
-    let mut text = "scene,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,j_direction,j_magnitude,j_torque,j_step,cost_us_per_s\n".to_owned();
-    for s in swept {
-        for measured in &s.all {
-            let _ = writeln!(text, "{},{}", s.name, fields(measured));
-        }
-    }
-    text
-}
-
-/// CSV of the choices.
-pub fn choices(swept: &[Swept]) -> String {
-    let mut text =
-        "scene,chosen_by,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,j_direction,j_magnitude,j_torque,j_step,cost_us_per_s,predicted_j\n"
-            .to_owned();
-    for s in swept {
-        let _ = writeln!(
-            text,
-            "{},auto,{},{:.6}",
-            s.name,
-            fields(&s.auto),
-            s.plan.predicted_j
-        );
-        if let Some(best) = s.cheapest() {
-            let _ = writeln!(text, "{},sweep,{},", s.name, fields(best));
-        }
-    }
-    text
+    println!("{kept} of {of} kept");
+    ExitCode::from(u8::from(kept < of))
 }

@@ -10,6 +10,7 @@
 //! | moving plate    | a rate, for an obstacle that moves by itself                     |
 //! | tilted rod      | rounds: the body turns quickly on a long lever                   |
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
@@ -40,6 +41,8 @@ const ROD: f64 = 0.04;
 const ROD_FORCE: f64 = 4.15;
 /// Time to come down and press before anything else, s.
 const PRESS: f64 = 0.2;
+/// Time between the poses of a hand's path in a file, s.
+const SAMPLED: f64 = 0.02;
 
 /// The hand's pose at a time, s.
 pub type Motion = Arc<dyn Fn(f64) -> Pose + Send + Sync>;
@@ -69,7 +72,7 @@ pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
         rise + 1.0
     );
     fs::write(directory.join("plate.csv"), trace)?;
-    Ok(vec![
+    let scenes = vec![
         box_on_plane(),
         sphere_on_sphere(),
         peg_in_hole(),
@@ -77,7 +80,42 @@ pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
         thin_plate(),
         moving_plate(rise),
         rod_on_plane(),
-    ])
+    ];
+    with_hands(scenes, directory)
+}
+
+/// The same with the hand's path in each scene file, as its author knows it: where the hand does not come, nothing is met.
+pub(super) fn with_hands(
+    scenes: Vec<FidelityScene>,
+    directory: &Path,
+) -> std::io::Result<Vec<FidelityScene>> {
+    let with_hand = |scene: FidelityScene| {
+        let file = format!("{}-hand.csv", scene.name.replace([' ', ','], "-"));
+        fs::write(directory.join(&file), scene.trace())?;
+        let text = format!("{}[hand]\npath = \"{file}\"\n", scene.text);
+        Ok(FidelityScene { text, ..scene })
+    };
+    scenes.into_iter().map(with_hand).collect()
+}
+
+impl FidelityScene {
+    /// The hand's path as a trace.
+    fn trace(&self) -> String {
+        let mut csv = "t,x,y,z,qw,qx,qy,qz\n".to_owned();
+        let samples = (self.duration / SAMPLED).ceil() as u32;
+        for sample in 0..=samples {
+            let time = (f64::from(sample) * SAMPLED).min(self.duration);
+            let pose = (self.device)(time);
+            let (p, q) = (pose.translation.vector, pose.rotation.quaternion());
+            let time = f64::from(sample) * SAMPLED;
+            let _ = writeln!(
+                csv,
+                "{time:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?}",
+                p.x, p.y, p.z, q.w, q.i, q.j, q.k
+            );
+        }
+        csv
+    }
 }
 
 /// A scene file: body, its start, obstacle, and what is known of its use: how fast the hand goes, m/s, and turns, rad/s, and how hard it presses, N.

@@ -1,6 +1,7 @@
 //! Every setting of the grid, run and measured, and the verdict on the scene's own choice.
 //!
-//! Error: J of [`measure`](crate::measure), the worst of the start phases. Cost: nominal microseconds of the god-object loop a second, counted and so the
+//! Error: J of [`felt`](crate::felt), the worst of the start phases: its 95th percentile, or half of its 99th where that is more, so that half a
+//! just-noticeable difference is the two lines of the laboratory at once. Cost: nominal microseconds of the god-object loop a second, counted and so the
 //! same on every machine of a type.
 
 use std::path::Path;
@@ -11,7 +12,9 @@ use taut_scene::{BuiltScene, FidelityPlan, Scene as SceneFile, SceneError};
 use super::counted::Counted;
 use super::scenes::FidelityScene;
 use crate::clock::{Charge, TICK, run};
-use crate::measure::{JND_DIRECTION, JND_MAGNITUDE, Measure, Measures};
+use crate::cpu_time::quantile;
+use crate::felt::Felt;
+use crate::measure::{Measure, Measures};
 use crate::method::Scene;
 use crate::recipe::{Ideal, Recipe};
 
@@ -42,8 +45,10 @@ pub struct Measured {
     pub setting: Setting,
     /// Error, in just-noticeable differences.
     pub j: f64,
-    /// What it is the largest of: direction, magnitude, torque, step.
-    pub parts: [f64; 4],
+    /// 95th and 99th percentile of J.
+    pub percentiles: [f64; 2],
+    /// J of the first version: the largest of direction, magnitude, torque and step, each by itself.
+    pub first: f64,
     /// Nominal us of the god-object loop a second.
     pub cost: f64,
 }
@@ -194,7 +199,8 @@ fn setting_of(chosen: &BuiltScene, plan: &FidelityPlan) -> Setting {
     }
 }
 
-fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
+/// The scene as a recipe, with this right answer.
+pub(super) fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
     let lab_scene = Scene {
         world: built.world.clone().into(),
         start: built.start,
@@ -218,19 +224,14 @@ fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
     }
 }
 
+/// Where the right answer of a scene comes from.
+pub(super) fn ideal(scene: &FidelityScene) -> Ideal {
+    scene.ideal.map_or(Ideal::Reference, Ideal::closed)
+}
+
 /// The right wrench at every tick.
 fn answer(scene: &FidelityScene, built: &BuiltScene) -> Vec<god_object::Vector6> {
-    let rough = built
-        .world
-        .obstacles
-        .iter()
-        .any(|o| o.surface.friction > 0.0);
-    let ideal = match scene.ideal {
-        Some(formula) => Ideal::closed(formula),
-        None if rough => Ideal::Reference,
-        None => Ideal::Followed,
-    };
-    let recipe = recipe(scene, built, ideal);
+    let recipe = recipe(scene, built, ideal(scene));
     let answer = recipe.answer();
     if !answer.converged() {
         eprintln!(
@@ -249,42 +250,43 @@ fn measure(
 ) -> Measured {
     let right = right.to_vec();
     let at = move |time: f64| right[(time / TICK).round() as usize];
-    let mut recipe = recipe(scene, built, Ideal::closed(at));
-    recipe.scene.settings.gap_tolerance = setting.gap_tolerance;
-    recipe.scene.settings.implicit_rounds = setting.rounds;
-    let (mut j, mut parts, mut work) = (0.0_f64, [0.0_f64; 4], 0);
+    measured(&recipe(scene, built, Ideal::closed(at)), setting)
+}
+
+/// A recipe run with a setting from both start phases.
+pub(super) fn measured(recipe: &Recipe, setting: Setting) -> Measured {
+    let mut scene = recipe.scene.clone();
+    scene.settings.gap_tolerance = setting.gap_tolerance;
+    scene.settings.implicit_rounds = setting.rounds;
+    let right = &recipe.answer().wrenches;
+    let body = &scene.world.body;
+    let arm = body.mesh.radius_about(&body.reference_point);
+    let (mut percentiles, mut first, mut work) = ([0.0_f64; 2], 0.0_f64, 0);
     for phase in PHASES {
-        let mut method = Counted::new(&recipe.scene);
-        let ran = run(
-            &mut method,
-            &recipe,
-            setting.rate as u32,
-            phase,
-            &mut Charge::WholePeriod,
-        );
-        let measures = Measures::of(&recipe, &ran.ticks);
-        let felt = measures.get(Measure::Felt);
-        // What is not a number is no small error.
-        j = if felt.is_nan() {
-            f64::INFINITY
-        } else {
-            j.max(felt)
-        };
-        let of_phase = [
-            measures.get(Measure::DirectionP95) / JND_DIRECTION,
-            measures.get(Measure::MagnitudeP95) / (100.0 * JND_MAGNITUDE),
-            measures.get(Measure::TorqueFelt),
-            measures.get(Measure::StepFelt),
-        ];
-        for (part, felt) in parts.iter_mut().zip(of_phase) {
-            *part = part.max(felt);
+        let mut method = Counted::new(&scene, &(recipe.device)(0.0));
+        let charge = &mut Charge::WholePeriod;
+        let ran = run(&mut method, recipe, setting.rate as u32, phase, charge);
+        let felt = Felt::new(&ran.ticks, right, arm);
+        for (most, share) in percentiles.iter_mut().zip([0.95, 0.99]) {
+            *most = or_more(*most, quantile(&felt.each, share));
         }
+        first = or_more(first, Measures::of(recipe, &ran.ticks).get(Measure::Felt));
         work += method.work.nominal_us();
     }
     Measured {
         setting,
-        j,
-        parts,
-        cost: work as f64 / (PHASES.len() as f64 * scene.duration),
+        j: or_more(percentiles[0], 0.5 * percentiles[1]),
+        percentiles,
+        first,
+        cost: work as f64 / (PHASES.len() as f64 * recipe.duration),
+    }
+}
+
+/// The larger of two; what is not a number is no small error.
+fn or_more(most: f64, other: f64) -> f64 {
+    if other.is_nan() {
+        f64::INFINITY
+    } else {
+        most.max(other)
     }
 }
