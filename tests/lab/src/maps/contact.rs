@@ -1,11 +1,12 @@
-//! Where the ball is pressed: on a wall, into a corner, and in a hollow, along which the contact turns, there as an exact ball and as a mesh.
+//! What is pressed where: a ball on a wall, into a corner, and in a hollow, along which the contact turns, there as an exact ball and as a mesh; and a peg
+//! against the side of its hole.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use god_object::{Body, Obstacle, Pose, Settings, World};
 use nalgebra::{Point3, Vector3};
-use taut_method_tests::solids::{mesh, obstacle};
-use taut_scene::shapes::{Axis, box_with_hole};
+use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_scene::shapes::{Axis, box_with_hole, cylinder};
 
 use crate::method::Scene;
 use crate::recipes::{ball, block, ground};
@@ -21,6 +22,11 @@ const DISTURBANCE_ALONG: f64 = 1e-3;
 const HOLLOW: f64 = 0.02;
 const FACETS: usize = 360;
 const BLOCK: f64 = 0.03;
+/// Sides of the peg, which is as round as the ball, and of its hole: corners of the one face the middles of the other's, so that the middle of the peg has
+/// a polygon of as many sides to move in, one of them below. Half of the peg's length and clearance, m.
+const SIDES: usize = 72;
+const PEG: f64 = 0.03;
+const CLEARANCE: f64 = 5e-4;
 /// Depth in the hollow over the ball's way from its axis. The force points at the axis: along the surface it is a spring of force over distance, so
 /// the surface itself is as many times stiffer.
 const DEPTH_SHARE: f64 = 0.1;
@@ -38,6 +44,8 @@ pub enum Contact {
     Hollow,
     /// The same, and the ball is a mesh of 320 triangles.
     MeshInHollow,
+    /// A peg against the side of its hole about y: it moves across the hole, and the normal turns about the hole's axis.
+    PegInHole,
 }
 
 /// A ball that is pressed and disturbed.
@@ -78,6 +86,18 @@ impl Contact {
                     free: x + z,
                 }
             }
+            Self::PegInHole => {
+                let hole = box_with_hole([PEG; 3], RADIUS + CLEARANCE, SIDES, Axis::Y);
+                let walls = vec![obstacle("hole", mesh(hole), Pose::identity())];
+                let peg = body(mesh(cylinder(RADIUS, PEG, SIDES, Axis::Y)));
+                Pressed {
+                    scene: scene_of(2.0 * PEG, (peg, walls), stiffness, Vector3::zeros()),
+                    push: -PUSH * z,
+                    at_rest: -(CLEARANCE + PUSH / stiffness) * z,
+                    disturbance: -DISTURBANCE * (0.8 * x + 0.6 * z),
+                    free: x + z,
+                }
+            }
             Self::Hollow | Self::MeshInHollow => {
                 let hole = box_with_hole([BLOCK; 3], HOLLOW, FACETS, Axis::Y);
                 let walls = vec![obstacle("hollow", mesh(hole), Pose::identity())];
@@ -98,9 +118,19 @@ impl Contact {
     }
 }
 
-fn scene((body, obstacles): (Body, Vec<Obstacle>), stiffness: f64, start: Vector3<f64>) -> Scene {
+fn scene(bodies: (Body, Vec<Obstacle>), stiffness: f64, start: Vector3<f64>) -> Scene {
+    scene_of(2.0 * RADIUS, bodies, stiffness, start)
+}
+
+/// Of a body of this size, m.
+fn scene_of(
+    size: f64,
+    (body, obstacles): (Body, Vec<Obstacle>),
+    stiffness: f64,
+    start: Vector3<f64>,
+) -> Scene {
     let world = World { body, obstacles };
-    let mut scene = Scene::new(world, 2.0 * RADIUS, 0.1, Pose::from(start));
+    let mut scene = Scene::new(world, size, 0.1, Pose::from(start));
     let mass = scene.world.body.mass;
     scene.settings = Settings {
         k_h: stiffness / (scene.settings.k_s * mass),

@@ -1,8 +1,8 @@
 //! Stability maps: the stiffest contact that each method renders to a simulated device, against delay, rate, damping and quantisation.
 //!
-//! A ball of 1 kg in the hand is pressed on a wall, into a corner or a hollow through a device that nobody holds, and disturbed. Above the critical
-//! stiffness that grows, below it dies away. What a map does not sweep is a device of 0.2 kg and 1 N s/m, forces and updates at 1 kHz, a tick of delay, no
-//! quantisation.
+//! A ball of 1 kg in the hand is pressed on a wall, into a corner or a hollow, or a peg against the side of its hole, through a device that nobody holds, and
+//! disturbed. Above the critical stiffness that grows, below it dies away. What a map does not sweep is a device of 0.2 kg and 1 N s/m, forces and updates
+//! at 1 kHz, a tick of delay, no quantisation.
 //!
 //! | symbol | name in code | unit  | meaning                                    |
 //! |--------|--------------|-------|--------------------------------------------|
@@ -16,6 +16,7 @@
 //! `b / (T/2 + t_d)`, and for quantisation the bound of passivity `min(2 b / T, 2 f_c / Delta)`
 //! (Abbott and Okamura 2005).
 
+mod axes;
 mod contact;
 mod files;
 
@@ -28,6 +29,7 @@ use taut_control_tests::closed_loop::{PERIOD, grip};
 use taut_plant::stability::{SampledLoop, linear_limit, passive_limit_quantised};
 use taut_plant::{Encoder, Grip, Hand, MinJerkPath, Motors, Plant};
 
+pub use axes::{Conditions, MAPS, Map};
 pub use contact::Contact;
 pub use files::write;
 pub(crate) use files::{COLOURS, panels};
@@ -59,134 +61,6 @@ const GROWN_AND_BOUNDED: f64 = 2.0;
 /// Softest and stiffest wall of the search, N/m, and the relative width at which it ends.
 const SEARCH: [f64; 2] = [20.0, 100_000.0];
 const SEARCH_WIDTH: f64 = 0.02;
-/// Coulomb friction where a count is swept, N: without it no count is passive.
-const COULOMB: f64 = 0.02;
-
-/// What is set.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Conditions {
-    /// What holds the ball.
-    pub contact: Contact,
-    /// t_d, s.
-    pub delay: f64,
-    /// f, Hz.
-    pub updates: u32,
-    /// Share of the way to the device that a god-object covers in an update, where it is not the method's own.
-    pub k_s: Option<f64>,
-    /// b, N s/m.
-    pub damping: f64,
-    /// f_c, N.
-    pub coulomb: f64,
-    /// Delta, m; 0 is none.
-    pub resolution: f64,
-}
-
-const STANDARD: Conditions = Conditions {
-    contact: Contact::Wall,
-    delay: 1e-3,
-    updates: 1000,
-    k_s: None,
-    damping: 1.0,
-    coulomb: 0.0,
-    resolution: 0.0,
-};
-
-/// One map.
-#[derive(Clone, Copy, Debug)]
-pub struct Map {
-    /// Name in files.
-    pub name: &'static str,
-    /// What is swept, with its unit.
-    pub axis: &'static str,
-    /// Where.
-    values: &'static [f64],
-    at: fn(f64) -> Conditions,
-}
-
-/// Updates, Hz.
-const RATES: [f64; 5] = [70.0, 140.0, 300.0, 500.0, 1000.0];
-
-/// All.
-pub const MAPS: [Map; 8] = [
-    Map {
-        name: "delay",
-        axis: "delay of the force, ms",
-        values: &[0.25, 0.5, 1.0, 2.0, 4.0, 8.0],
-        at: |ms| Conditions {
-            delay: ms * 1e-3,
-            ..STANDARD
-        },
-    },
-    Map {
-        name: "rate",
-        axis: "updates of the method, Hz (forces 1 kHz)",
-        values: &RATES,
-        at: |hz| Conditions {
-            updates: hz as u32,
-            ..STANDARD
-        },
-    },
-    Map {
-        name: "corner",
-        axis: "updates of the method in a corner of two walls, Hz",
-        values: &RATES,
-        at: |hz| Conditions {
-            contact: Contact::Corner,
-            updates: hz as u32,
-            ..STANDARD
-        },
-    },
-    Map {
-        name: "turning",
-        axis: "updates of the method in a hollow, where the contact turns, Hz",
-        values: &RATES,
-        at: |hz| Conditions {
-            contact: Contact::Hollow,
-            updates: hz as u32,
-            ..STANDARD
-        },
-    },
-    Map {
-        name: "turning-mesh",
-        axis: "updates of the method, Hz, for a ball of 320 triangles in that hollow",
-        values: &RATES,
-        at: |hz| Conditions {
-            contact: Contact::MeshInHollow,
-            updates: hz as u32,
-            ..STANDARD
-        },
-    },
-    Map {
-        name: "way",
-        axis: "share k_s of the way that an update covers, in a hollow at 300 Hz",
-        values: &[0.25, 0.5, 0.75, 1.0],
-        at: |k_s| Conditions {
-            contact: Contact::Hollow,
-            updates: 300,
-            k_s: Some(k_s),
-            ..STANDARD
-        },
-    },
-    Map {
-        name: "damping",
-        axis: "damping of the device, N s/m",
-        values: &[0.2, 0.5, 1.0, 2.0, 5.0, 10.0],
-        at: |damping| Conditions {
-            damping,
-            ..STANDARD
-        },
-    },
-    Map {
-        name: "quantisation",
-        axis: "a count of the encoder, um (friction 0.02 N)",
-        values: &[1.0, 5.0, 29.24, 100.0, 300.0],
-        at: |um| Conditions {
-            coulomb: COULOMB,
-            resolution: um * 1e-6,
-            ..STANDARD
-        },
-    },
-];
 
 /// One point of a map: a row of its CSV.
 #[derive(Clone, Debug, PartialEq)]
@@ -364,6 +238,7 @@ pub(crate) fn tasks(extent: Extent) -> Vec<(Map, f64, Method)> {
 
 #[cfg(test)]
 mod tests {
+    use super::axes::STANDARD;
     use super::*;
 
     /// The method of this project is a spring to the wall: its limit is that of the eigenvalues.
@@ -400,6 +275,19 @@ mod tests {
         };
         let ratio = at(Contact::Corner) / at(Contact::Wall);
         assert!((0.95..1.05).contains(&ratio), "{ratio}");
+    }
+
+    /// In a hole the normal turns about the hole's axis: what knows the next sides bears what it bears on a wall.
+    #[test]
+    fn a_peg_in_its_hole_bears_what_a_wall_does() {
+        let hole = Conditions {
+            contact: Contact::PegInHole,
+            updates: 300,
+            ..STANDARD
+        };
+        let (found, spring) = (hole.critical(Method::Ours), hole.by_eigenvalues());
+        assert!((0.95..1.05).contains(&(found / spring)), "{found}");
+        assert!(hole.critical(Method::Paper) < found);
     }
 
     /// Normals of a hollow are as old as the body is behind: what goes all the way to the device bears more, and not what a wall does.

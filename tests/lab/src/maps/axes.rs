@@ -1,0 +1,142 @@
+//! What is swept: the conditions of each map.
+
+use super::contact::Contact;
+
+/// Coulomb friction where a count is swept, N: without it no count is passive.
+const COULOMB: f64 = 0.02;
+
+/// What is set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conditions {
+    /// What holds the ball or the peg.
+    pub contact: Contact,
+    /// t_d, s.
+    pub delay: f64,
+    /// f, Hz.
+    pub updates: u32,
+    /// Share of the way to the device that a god-object covers in an update, where it is not the method's own.
+    pub k_s: Option<f64>,
+    /// b, N s/m.
+    pub damping: f64,
+    /// f_c, N.
+    pub coulomb: f64,
+    /// Delta, m; 0 is none.
+    pub resolution: f64,
+}
+
+pub(super) const STANDARD: Conditions = Conditions {
+    contact: Contact::Wall,
+    delay: 1e-3,
+    updates: 1000,
+    k_s: None,
+    damping: 1.0,
+    coulomb: 0.0,
+    resolution: 0.0,
+};
+
+/// One map.
+#[derive(Clone, Copy, Debug)]
+pub struct Map {
+    /// Name in files.
+    pub name: &'static str,
+    /// What is swept, with its unit.
+    pub axis: &'static str,
+    /// Where.
+    pub(super) values: &'static [f64],
+    pub(super) at: fn(f64) -> Conditions,
+}
+
+/// Updates, Hz.
+const RATES: [f64; 5] = [70.0, 140.0, 300.0, 500.0, 1000.0];
+
+/// All.
+pub const MAPS: [Map; 9] = [
+    Map {
+        name: "delay",
+        axis: "delay of the force, ms",
+        values: &[0.25, 0.5, 1.0, 2.0, 4.0, 8.0],
+        at: |ms| Conditions {
+            delay: ms * 1e-3,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "rate",
+        axis: "updates of the method, Hz (forces 1 kHz)",
+        values: &RATES,
+        at: |hz| Conditions {
+            updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "corner",
+        axis: "updates of the method in a corner of two walls, Hz",
+        values: &RATES,
+        at: |hz| Conditions {
+            contact: Contact::Corner,
+            updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "turning",
+        axis: "updates of the method in a hollow, where the contact turns, Hz",
+        values: &RATES,
+        at: |hz| Conditions {
+            contact: Contact::Hollow,
+            updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "turning-mesh",
+        axis: "updates of the method, Hz, for a ball of 320 triangles in that hollow",
+        values: &RATES,
+        at: |hz| Conditions {
+            contact: Contact::MeshInHollow,
+            updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "hole",
+        axis: "updates of the method, Hz, for a peg in its hole",
+        values: &RATES,
+        at: |hz| Conditions {
+            contact: Contact::PegInHole,
+            updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "way",
+        axis: "share k_s of the way that an update covers, in a hollow at 300 Hz",
+        values: &[0.25, 0.5, 0.75, 1.0],
+        at: |k_s| Conditions {
+            contact: Contact::Hollow,
+            updates: 300,
+            k_s: Some(k_s),
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "damping",
+        axis: "damping of the device, N s/m",
+        values: &[0.2, 0.5, 1.0, 2.0, 5.0, 10.0],
+        at: |damping| Conditions {
+            damping,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "quantisation",
+        axis: "a count of the encoder, um (friction 0.02 N)",
+        values: &[1.0, 5.0, 29.24, 100.0, 300.0],
+        at: |um| Conditions {
+            coulomb: COULOMB,
+            resolution: um * 1e-6,
+            ..STANDARD
+        },
+    },
+];
