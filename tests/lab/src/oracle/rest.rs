@@ -25,8 +25,8 @@ use crate::method::Scene;
 
 /// A step below this is none, m: a micronewton at 1000 N/m.
 const AT_REST: f64 = 1e-9;
-/// Most steps for one sample of the device: the way of 40 mm at the usual step.
-const MOST_STEPS: u32 = 2000;
+/// Most steps for one sample of the device: a way of 100 mm at the usual step.
+const MOST_STEPS: u32 = 10_000;
 /// After so many steps without turning back they may become longer again, each by so much.
 const ONWARD: u32 = 8;
 const GROWTH: f64 = 1.5;
