@@ -115,7 +115,8 @@ pub enum Method {
     Penalty,
     /// A point shell that penalty pushes out, where it balances with a saturating spring to the device.
     StaticCoupling,
-    /// A dynamic body on a spring and damper, integrated implicitly for each force against linearised penalty contacts.
+    /// A dynamic body on a spring and damper, integrated implicitly for each force against linearised penalty
+    /// contacts.
     LinearisedPenalty,
     /// The complementarity problem of contacts by proximity, solved anew for each force.
     TwoRateLcp,

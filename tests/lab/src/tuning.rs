@@ -30,13 +30,15 @@ pub(crate) const PROXIES: [(f64, f64); 6] = [
 pub(crate) const SHELL_SPACINGS: [f64; 2] = [0.125, f64::INFINITY];
 /// What the forces on a ball add up to that is tried: it may touch several obstacles.
 const ROUND: [ShellForce; 2] = [ShellForce::Deepest, ShellForce::Sum];
-/// Stiffness of a contact over that of the coupling, for the methods whose contacts are penalties: an implicit solution bears any.
+/// Stiffness of a contact over that of the coupling, for the methods whose contacts are penalties: an
+/// implicit solution bears any.
 const CONTACT_STIFFNESSES: [f64; 2] = [1e3, 1e4];
 /// Finest spacing of the nested shell, over the body's longest side.
 const FINE_SPACING: f64 = 0.03125;
 /// Inertias and damping ratios that are tried for the tool of linearised penalty.
 const TOOLS: [(f64, f64); 3] = [(0.02, 1.0), (0.005, 0.3), (0.0, 0.0)];
-/// Contact distances of the two-rate LCP that are tried, in rest distances, and its alarm distance, in activation distances: a tenth of the body.
+/// Contact distances of the two-rate LCP that are tried, in rest distances, and its alarm distance, in
+/// activation distances: a tenth of the body.
 const CONTACT_DISTANCES: [f64; 3] = [1.0, 10.0, 100.0];
 const ALARM_DISTANCE: f64 = 25.0;
 /// Distances within which the point god-object counts faces as touched that are tried, in rest distances.
@@ -108,7 +110,8 @@ fn touching() -> impl Iterator<Item = Tuning> {
     [Tuning::Default].into_iter().chain(others)
 }
 
-/// As published, along the normals of the points and with a body that stands between updates; and without either, ever stiffer and finer.
+/// As published, along the normals of the points and with a body that stands between updates; and without
+/// either, ever stiffer and finer.
 fn static_couplings() -> Vec<Tuning> {
     let [soft, stiff] = CONTACT_STIFFNESSES;
     let spaced = ShellPoints::Spaced(SHELL_SPACINGS[0]);
@@ -210,7 +213,8 @@ pub enum Tuning {
     Proximity {
         /// Gap that contacts keep, in rest distances.
         contact: f64,
-        /// Gap within which they are looked for beyond that, in activation distances; `None`: as far as device and body may go.
+        /// Gap within which they are looked for beyond that, in activation distances; `None`: as far as
+        /// device and body may go.
         alarm: Option<f64>,
     },
     /// Distance within which the point god-object counts faces as touched, in rest distances.

@@ -136,7 +136,8 @@ impl LinearisedPenalty {
         }
     }
 
-    /// Contacts of the tool within a distance, m. An obstacle that the tool is in has no gap between features: there points of the tool stand for it.
+    /// Contacts of the tool within a distance, m. An obstacle that the tool is in has no gap between
+    /// features: there points of the tool stand for it.
     fn look(&mut self, distance: f64) {
         let body = &self.world.body;
         let pose = from_reference_point(&self.tool, &body.reference_point);
@@ -280,7 +281,8 @@ mod tests {
         Pose::translation(0.0, 0.0, 0.005 + height)
     }
 
-    /// Comes down to -1 mm in 100 ms and stays for as long, with an update every `every` ms; the last force, and how far out of the plate the tool is.
+    /// Comes down to -1 mm in 100 ms and stays for as long, with an update every `every` ms; the last force,
+    /// and how far out of the plate the tool is.
     fn pressed(tuning: Tuning, every: u32) -> (f64, f64) {
         let scene = scene();
         let mut method = LinearisedPenalty::new(&scene, tuning);

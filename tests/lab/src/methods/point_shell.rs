@@ -39,7 +39,8 @@ struct Ball {
     /// Of its points.
     first: usize,
     end: usize,
-    /// The second of the balls that it is divided into; the first one is next to it. `None`: it is not divided.
+    /// The second of the balls that it is divided into; the first one is next to it. `None`: it is not
+    /// divided.
     second: Option<usize>,
 }
 
@@ -54,7 +55,8 @@ pub(super) struct PointShell {
 }
 
 impl PointShell {
-    /// Of a world's body. `own_normals`: forces go along the normals of the points, else along the field's gradient.
+    /// Of a world's body. `own_normals`: forces go along the normals of the points, else along the field's
+    /// gradient.
     pub(super) fn new(world: &World, points: ShellPoints, own_normals: bool) -> Self {
         let mut places = places(&world.body, points, own_normals);
         let mut balls = Vec::new();
@@ -69,7 +71,8 @@ impl PointShell {
         }
     }
 
-    /// Appends the planes of one obstacle before every point that is in it, or no farther away than `margin`, m.
+    /// Appends the planes of one obstacle before every point that is in it, or no farther away than `margin`,
+    /// m.
     pub(super) fn find(
         &mut self,
         world: &World,
@@ -142,7 +145,8 @@ fn places(body: &Body, points: ShellPoints, own_normals: bool) -> Vec<Place> {
     places
 }
 
-/// Points of every face, edges and corners among them, no farther than `spacing` from each other, m; infinite: corners alone.
+/// Points of every face, edges and corners among them, no farther than `spacing` from each other, m;
+/// infinite: corners alone.
 fn spread(mesh: &Mesh, spacing: f64, own_normals: bool) -> Vec<Place> {
     let mut places = Vec::new();
     for triangle in 0..mesh.triangles().len() as u32 {

@@ -43,7 +43,8 @@ pub(super) fn on_hand(wrench: &Vector6, settings: &Settings) -> Vector6 {
     limited(wrench, settings)
 }
 
-/// The motion after which the spring to a hand that is `difference` away and the springs of the contacts balance.
+/// The motion after which the spring to a hand that is `difference` away and the springs of the contacts
+/// balance.
 pub(super) fn balance(
     stiffness: &Matrix6<f64>,
     difference: &Vector6,

@@ -1,4 +1,4 @@
-//! Points all over a mesh, and the signed distance of a point to one: what the penalty method is made of.
+//! Points all over a mesh, and the signed distance of a point to one: what penalty methods are made of.
 
 use std::collections::HashMap;
 

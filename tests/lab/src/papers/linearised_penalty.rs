@@ -100,7 +100,8 @@ fn offset() -> f64 {
     scene.settings.force_limit / (RATIO * scene.stiffness())
 }
 
-/// A cube slides on a plane: the largest force along it over that across it, and the largest error of that across it, from half of the way on.
+/// A cube slides on a plane: the largest force along it over that across it, and the largest error of that
+/// across it, from half of the way on.
 fn slid(tuning: Tuning) -> (f64, f64) {
     let world = World {
         body: cube(HALF),
