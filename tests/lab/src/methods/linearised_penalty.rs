@@ -10,12 +10,12 @@
 //!
 //! An update looks for contacts of the tool where it is, and makes a penalty of each: a spring from an offset on. A force takes one step of backward
 //! Euler for the tool: `(mu / h^2 + beta / h + kappa) M a = M (mu v / h + beta v_h + kappa (x_h - x)) + F(a)`, F the contacts' wrench for the motion a,
-//! and renders the coupling's spring and damper. The spring saturates, as that of the static coupling.
+//! and renders the coupling's spring and damper.
 //!
 //! Source: M. A. Otaduy and M. C. Lin, "A modular haptic rendering algorithm for stable and transparent 6-DOF manipulation", IEEE Transactions on Robotics
 //! 2006. There the wrench of all contacts is linear until the next update ([`LinearContacts::Whole`]); a tuning of this file keeps each contact's
 //! spring one-sided instead ([`LinearContacts::Each`]), so that a contact that ends does not pull. Of this file are too: an offset that lets the surfaces
-//! meet only where the coupling saturates, contacts that are known before they touch, closest features of the meshes in place of a hierarchy
+//! meet only where the coupling is beyond the limit of the force, contacts that are known before they touch, closest features of the meshes in place of a hierarchy
 //! of levels of detail, no clustering (backward Euler bears the sum of the springs), and no damping of contacts (backward Euler of a light tool has more).
 
 use std::sync::Arc;
@@ -23,14 +23,14 @@ use std::sync::Arc;
 use god_object::collision::surfaces_intersect;
 use god_object::shape::Primitive;
 use god_object::spatial::{
-    advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference, six,
+    advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference,
 };
 use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Matrix6, Vector3};
 
 use super::contacts::ContactFinder;
 use super::point_shell::PointShell;
-use super::saturating_spring::{mass_matrix, on_hand, scales};
+use super::saturating_spring::{mass_matrix, on_hand};
 use super::settle::{Spring, settle};
 use super::tangent_plane::TangentPlane;
 use super::virtual_coupling::device_velocity;
@@ -186,11 +186,10 @@ impl LinearisedPenalty {
     fn advance(&mut self, since: f64, difference: &Vector6, hand: &Vector6) -> Option<()> {
         let metric = (self.world.body).metric(self.settings.rotation_metric, &self.tool)?;
         let rest = self.share / (since * since) + self.damping / since;
-        let spring = difference * self.stiffness;
-        let by = scales(&metric.mass_matrix_times(&spring), &self.settings);
-        let mut matrix = mass_matrix(&metric, by.map(|by| rest + by * self.stiffness));
-        let spring = six(&(linear(&spring) * by[0]), &(angular(&spring) * by[1]));
-        let pull = self.velocity * (self.share / since) + hand * self.damping + spring;
+        let mut matrix = mass_matrix(&metric, rest + self.stiffness);
+        let pull = self.velocity * (self.share / since)
+            + hand * self.damping
+            + difference * self.stiffness;
         let mut pull = metric.mass_matrix_times(&pull);
         match self.contacts {
             LinearContacts::Whole => {

@@ -18,16 +18,16 @@ const SAME: f64 = 1e-6;
 /// N and N m: poses of a metre are rounded to 1e-16 of it, and springs have some thousand newtons to a metre.
 const ROUNDING: f64 = 1e-12;
 
-/// `M`, its linear and its angular part each times a number, as a matrix.
-pub(super) fn mass_matrix(metric: &Metric, times: [f64; 2]) -> Matrix6<f64> {
-    let mut matrix = Matrix6::identity() * (metric.mass() * times[0]);
-    let inertia = metric.inertia_in_world() * times[1];
+/// `M` times a number, as a matrix.
+pub(super) fn mass_matrix(metric: &Metric, times: f64) -> Matrix6<f64> {
+    let mut matrix = Matrix6::identity() * (metric.mass() * times);
+    let inertia = metric.inertia_in_world() * times;
     matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia);
     matrix
 }
 
 /// What force and torque of a wrench are scaled by, so that neither is above its limit.
-pub(super) fn scales(wrench: &Vector6, settings: &Settings) -> [f64; 2] {
+fn scales(wrench: &Vector6, settings: &Settings) -> [f64; 2] {
     [
         (settings.force_limit / linear(wrench).norm()).min(1.0),
         (settings.torque_limit / angular(wrench).norm()).min(1.0),

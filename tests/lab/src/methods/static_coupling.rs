@@ -113,7 +113,7 @@ impl StaticCoupling {
     fn coupling(&self, at: &Pose) -> Option<Matrix6<f64>> {
         let metric = (self.world.body).metric(self.settings.rotation_metric, at)?;
         let per_mass = self.settings.k_h * self.settings.k_s;
-        Some(mass_matrix(&metric, [per_mass; 2]))
+        Some(mass_matrix(&metric, per_mass))
     }
 }
 
