@@ -8,6 +8,9 @@ use god_object::shape::Nearest;
 use god_object::{Mesh, Obstacle};
 use nalgebra::{Point3, Vector3};
 
+/// Between the way to the nearest point of a face and the face's normal: less is rounding, rad.
+const SAME_DIRECTION: f64 = 1e-6;
+
 /// Points of a mesh: its vertices, and more on its edges and faces, no farther than `spacing` from each other, m; infinite: none.
 pub(super) fn points(mesh: &Mesh, spacing: f64) -> Vec<Point3<f64>> {
     let mut points = mesh.vertices().to_vec();
@@ -78,8 +81,15 @@ impl DistanceField {
             return None;
         }
         let way = if inside { out } else { -out };
-        // On the surface there is no way.
-        let normal = (way.try_normalize(f64::MIN_POSITIVE)).unwrap_or_else(|| outward.normalize());
+        let face = self.mesh.face_normal(found.triangle);
+        // Across a face its own normal is exact; near the surface the way is rounding.
+        let aside = (way - face * way.norm()).norm();
+        let normal = if aside < SAME_DIRECTION * way.norm() {
+            *face
+        } else {
+            // On the surface there is no way.
+            (way.try_normalize(f64::MIN_POSITIVE)).unwrap_or_else(|| outward.normalize())
+        };
         Some(Nearest {
             normal,
             distance: -normal.dot(&out),
@@ -163,6 +173,20 @@ mod tests {
         let near = field.nearest(&above, 2.1e-3).expect("near");
         assert!((near.distance - 2e-3).abs() < 1e-15);
         assert!((near.normal - Vector3::z()).norm() < 1e-14);
+    }
+
+    /// Along a face's diagonal, too, where two of its triangles meet.
+    #[test]
+    fn near_a_face_the_normal_is_that_of_the_face() {
+        let field = DistanceField::new(&mesh(cuboid([0.1, 0.1, 0.01])));
+        for (x, y) in [(0.0, 0.0), (0.03, 0.03), (0.02, -0.07)] {
+            for height in [1e-9, -1e-9, 1e-6, -1e-6] {
+                let point = Point3::new(x, y, 0.01 + height);
+                let found = field.nearest(&point, 1e-3).expect("near");
+                assert!((found.normal - Vector3::z()).norm() < 1e-15, "{found:?}");
+                assert!((found.distance - height).abs() < 1e-15, "{found:?}");
+            }
+        }
     }
 
     #[test]
