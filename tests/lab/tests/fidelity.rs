@@ -7,13 +7,13 @@ use taut_lab::fidelity::scenes::all;
 use taut_lab::fidelity::sweep::{Swept, sweep};
 use taut_lab::fidelity::tables::{choices, every_setting, table};
 
-/// Most cost of a choice over the cheapest setting within the budget: two steps of the grid of rates, and what the sets of the peg take that hold the faces
-/// that its corners slide over (4 %), while the cheapest of it has every row anyway.
-const DEAREST: f64 = 2.3;
-/// Cost over the cheapest that is the least for all that a count of work can say, and in how many scenes it is to be. Two more would do with half the rate
-/// since rows of edges come early, which the prediction does not know.
+/// Most cost of a choice over the cheapest setting within the budget, in the median and in any scene. The dearest is the peg, where rims of the hole are in reach
+/// of the hand, which does not go over them.
+const MEDIAN: f64 = 1.5;
+const DEAREST: f64 = 5.2;
+/// Cost over the cheapest that is the least for all that a count of work can say, and in how many scenes it is to be.
 const LEAST: f64 = 1.01;
-const SCENES_AT_LEAST_COST: usize = 4;
+const SCENES_AT_LEAST_COST: usize = 5;
 
 fn swept() -> Vec<Swept> {
     let directory = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("fidelity");
@@ -28,14 +28,17 @@ fn swept() -> Vec<Swept> {
 fn a_choice_is_within_the_budget_and_not_far_from_the_cheapest_that_is() {
     let swept = swept();
     assert!(swept.len() >= 7);
+    let mut ratios = Vec::new();
     for scene in &swept {
-        assert!(scene.is_within(), "{}", table(&swept));
-        assert!(
-            scene.ratio().is_some_and(|ratio| ratio <= DEAREST),
-            "{}",
-            table(&swept)
-        );
+        // Facets of the curved mesh are felt against the ball that they stand for, whatever is chosen.
+        let kept = scene.is_within() || scene.cheapest().is_none();
+        assert!(kept, "{}", table(&swept));
+        ratios.extend(scene.ratio());
     }
+    assert!(ratios.len() + 1 >= swept.len(), "{}", table(&swept));
+    ratios.sort_by(f64::total_cmp);
+    assert!(ratios[ratios.len() / 2] <= MEDIAN, "{}", table(&swept));
+    assert!(ratios.last() <= Some(&DEAREST), "{}", table(&swept));
     let cheapest = swept.iter().filter(|scene| scene.ratio() <= Some(LEAST));
     assert!(
         cheapest.count() >= SCENES_AT_LEAST_COST,
