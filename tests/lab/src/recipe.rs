@@ -205,7 +205,8 @@ impl Recipe {
         (self.duration / TICK).round() as u32 + 1
     }
 
-    /// The right answer at every tick; a reference run is made, or read from its cache, on the first call, and a table is read.
+    /// The right answer at every tick; a reference run is made, or read from its cache, on the first call,
+    /// and a table is read.
     pub fn answer(&self) -> &Answer {
         self.answer.get_or_init(|| match &self.ideal {
             Ideal::Closed(formula) => {

@@ -17,7 +17,8 @@ fn apart(one: &[Vector6], other: &[Vector6]) -> [f64; 2] {
     [largest(linear), largest(angular)]
 }
 
-/// A formula is of bodies that touch, the oracle's stay a clearance apart: so many of them, of up to three walls, at the stiffness of the spring.
+/// A formula is of bodies that touch, the oracle's stay a clearance apart: the bound of the force is so many
+/// clearances at the stiffness of the spring, since up to three walls add.
 const CLEARANCES: f64 = 4.0;
 
 fn is_found_again(name: &str, case: &str, samples: u32) {
@@ -88,7 +89,8 @@ fn with_tables() -> Vec<Recipe> {
     recipes
 }
 
-/// From poses of the table on, where the body is held most: what another oracle would have written is noticed.
+/// From poses of the table on, where the body is held most: what another oracle would have written is
+/// noticed.
 #[test]
 fn a_part_of_each_table_is_found_again() {
     for recipe in with_tables() {

@@ -57,7 +57,8 @@ pub struct FidelityScene {
     pub device: Motion,
     /// s.
     pub duration: f64,
-    /// The right wrench at a time, s; `None` takes a run of the oracle, or with friction a reference run: no obstacle moves in either.
+    /// The right wrench at a time, s; `None` takes a run of the oracle, or with friction a reference run: no
+    /// obstacle moves in either.
     pub ideal: Option<fn(f64) -> Vector6>,
 }
 

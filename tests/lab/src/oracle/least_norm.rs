@@ -90,7 +90,8 @@ fn remainder(columns: &[Vector7]) -> Vector7 {
     rest
 }
 
-/// Least squares with the columns in use: modified Gram-Schmidt, each column taken out twice. `None` where they are dependent.
+/// Least squares with the columns in use: modified Gram-Schmidt, each column taken out twice.
+/// `None` where they are dependent.
 fn solve(columns: &[Vector7], used: &[(usize, f64)], target: &Vector7) -> Option<Vec<f64>> {
     let count = used.len();
     if count > 7 {

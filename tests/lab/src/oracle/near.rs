@@ -62,7 +62,8 @@ impl Near {
         }
     }
 
-    /// What is nearer than `band` at a pose, `way` into the run; no pose in between was farther than `way` says.
+    /// What is nearer than `band` at a pose, `way` into the run; no pose in between was farther than `way`
+    /// says.
     pub(super) fn look(&mut self, pose: &Pose, way: f64, band: f64) -> View {
         // Whoever was no candidate is farther than this.
         if MARGIN - (way - self.gathered) < band + 2.0 * LONGEST_STEP {

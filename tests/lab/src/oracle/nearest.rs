@@ -10,8 +10,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::solid::{Cell, Solid};
 
-/// Sine of the angle by which a surface may rise beside a local minimum: some times what rounding makes of flat surfaces, and a slope
-/// that holds a body by a millionth of the force.
+/// Sine of the angle by which a surface may rise beside a local minimum: some times what rounding makes of
+/// flat surfaces, and a slope that holds a body by a millionth of the force.
 const FLAT: f64 = 1e-6;
 /// Squared sine of the angle below which two edges are parallel; their ends are tried by themselves.
 const PARALLEL: f64 = 1e-12;
@@ -56,7 +56,8 @@ impl Placed<'_> {
         self.solid.edges[edge as usize].ends.map(|end| self.at(end))
     }
 
-    /// Whether the surface beside a feature falls away from the plane through it that is square to `direction`.
+    /// Whether the surface beside a feature falls away from the plane through it that is normal to
+    /// `direction`.
     fn falls_away(&self, feature: Feature, direction: &Vector3<f64>) -> bool {
         let (from, beside) = match feature {
             Feature::Vertex(vertex) => (vertex, &self.solid.adjacent[vertex as usize]),
@@ -241,8 +242,8 @@ fn height_over(point: &Point3<f64>, face: &[Point3<f64>; 3]) -> Option<(Vector3<
     inside.then_some((normal, height))
 }
 
-/// Nearest point on the first of two edges, the normal from the second to it, and their distance; `None` where they are parallel, or
-/// nearest at an end.
+/// Nearest point on the first of two edges, the normal from the second to it, and their distance; `None`
+/// where they are parallel, or nearest at an end.
 fn between_edges(
     mine: &[Point3<f64>; 2],
     other: &[Point3<f64>; 2],
@@ -295,7 +296,8 @@ pub(super) fn cross((body, a): (Placed<'_>, u32), (obstacle, b): (Placed<'_>, u3
         || through(&other.edges, &obstacle, mine.face, &body)
 }
 
-/// By signs of volumes: the ends on different sides of the face, and the line on the same side of its three edges.
+/// By signs of volumes: the ends on different sides of the face, and the line on the same side of its three
+/// edges.
 fn goes_through(edge: &[Point3<f64>; 2], face: &[Point3<f64>; 3]) -> bool {
     let volume = |p: &Point3<f64>, q: &Point3<f64>, r: &Point3<f64>, s: &Point3<f64>| {
         (q - p).cross(&(r - p)).dot(&(s - p))

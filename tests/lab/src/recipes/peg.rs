@@ -28,8 +28,9 @@ const CLEARANCES: [f64; 3] = [0.5e-3, 0.1e-3, 0.05e-3];
 const OUT: f64 = 0.01;
 const OFFSET: f64 = 3e-3;
 const SPEED: f64 = 0.05;
-/// How far the peg that is brought in stays beside the plane that mirrors both parts, m. On it rounding decides to which side the peg tips
-/// at the rim, and there is no one right answer; at 0.1 mm half the clearance of the oracle still decides, at 0.3 mm no more.
+/// How far the peg that is brought in stays beside the plane that mirrors both parts, m. On it rounding
+/// decides to which side the peg tips at the rim, and there is no one right answer; at 0.1 mm half the
+/// clearance of the oracle still decides, at 0.3 mm no more.
 const BESIDE: f64 = 3e-4;
 /// Time for a quarter turn of the offset, s.
 const TURNING: f64 = 0.5;
