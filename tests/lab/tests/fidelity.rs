@@ -7,11 +7,13 @@ use taut_lab::fidelity::scenes::all;
 use taut_lab::fidelity::sweep::{Swept, sweep};
 use taut_lab::fidelity::tables::{choices, every_setting, table};
 
-/// Most cost of a choice over the cheapest setting within the budget, in the median and in any scene. The dearest is the peg, where rims of the hole are in reach
+/// Most cost of a choice over the cheapest setting within the budget, in the median and in any scene. The
+/// dearest is the peg, where rims of the hole are in reach
 /// of the hand, which does not go over them.
 const MEDIAN: f64 = 1.5;
 const DEAREST: f64 = 5.2;
-/// Cost over the cheapest that is the least for all that a count of work can say, and in how many scenes it is to be.
+/// Cost over the cheapest that is the least for all that a count of work can say, and in how many scenes it
+/// is to be.
 const LEAST: f64 = 1.01;
 const SCENES_AT_LEAST_COST: usize = 5;
 

@@ -26,7 +26,8 @@ pub struct BodyNeed {
     pub exact: bool,
     /// Angle at which the facets of its smooth parts meet, rad; 0 of an exact form.
     pub facet_angle: f64,
-    /// Edges of the facets that stand for its smooth parts, of the largest angle between two that share an edge or a corner.
+    /// Edges of the facets that stand for its smooth parts, of the largest angle between two that share an
+    /// edge or a corner.
     pub bends: Option<Edges>,
     /// Its convex edges, as far as the hand's path brings the body to them.
     pub creases: Option<Edges>,
@@ -77,8 +78,10 @@ impl BodyNeed {
         }
     }
 
-    /// A mesh: the curvature that the edges of its smooth convex parts stand for, their angle over the way across them. On a face whose edges all
-    /// bend that is a third of its height (to its centroid in a regular mesh), on one that bends at one edge alone, as on a cylinder, half of it.
+    /// A mesh: the curvature that the edges of its smooth convex parts stand for, their angle over the way
+    /// across them. On a face whose edges all
+    /// bend that is a third of its height (to its centroid in a regular mesh), on one that bends at one edge
+    /// alone, as on a cylinder, half of it.
     ///
     /// Edges and faces count as far as they are `met`.
     #[must_use]
@@ -183,7 +186,8 @@ fn bending_edges(mesh: &Mesh) -> Vec<u8> {
     bending
 }
 
-/// The largest angle between two faces at a corner without a hollow, rad: what slides over the corner goes from one to the other at once.
+/// The largest angle between two faces at a corner without a hollow, rad: what slides over the corner goes
+/// from one to the other at once.
 fn largest_at_corners(mesh: &Mesh) -> f64 {
     let mut hollow = vec![false; mesh.vertices().len()];
     for edge in mesh.edges().iter().filter(|edge| edge.convexity < -FLAT) {

@@ -119,7 +119,8 @@ impl Contact<'_> {
         parallel(curvature, self.need.depth())
     }
 
-    /// What slides over the obstacle's edges, and over the body's: there a round obstacle alone. Where edges of both cross, other rows hold as well.
+    /// What slides over the obstacle's edges, and over the body's: there a round obstacle alone. Where edges
+    /// of both cross, other rows hold as well.
     fn roundings(&self) -> [f64; 2] {
         [self.need.body.rounding(), self.obstacle.curvature].map(|rounding| self.deep(rounding))
     }
@@ -170,7 +171,8 @@ impl Contact<'_> {
         }
     }
 
-    /// How much the error of the normal comes and goes by facets that are finer than the lag, rad: in the mean it is that of the slope.
+    /// How much the error of the normal comes and goes by facets that are finer than the lag, rad: in the
+    /// mean it is that of the slope.
     fn fluctuation(&self, sets: &Sets) -> f64 {
         let slope = self.deep(self.curvature());
         let bodies = [self.obstacle, &self.need.body].into_iter();

@@ -50,7 +50,8 @@ impl Edges {
         })
     }
 
-    /// What is felt of them where sets are up to `lag`, m, behind, and what slides over them is round by `rounding`, 1/m, where the device is.
+    /// What is felt of them where sets are up to `lag`, m, behind, and what slides over them is round by
+    /// `rounding`, 1/m, where the device is.
     #[must_use]
     pub fn felt(&self, rounding: f64, lag: f64, pressed: &Pressed) -> f64 {
         let at = |share: f64| {
@@ -60,7 +61,8 @@ impl Edges {
         at(SHARES[0]).max(0.5 * at(SHARES[1]))
     }
 
-    /// Whether they come so often that what happens at one of them, `for_way`, m, long, fills the shares that are judged: 1, or half where only the
+    /// Whether they come so often that what happens at one of them, `for_way`, m, long, fills the shares that
+    /// are judged: 1, or half where only the
     /// smaller one is filled, or 0.
     #[must_use]
     pub fn weight(&self, for_way: f64) -> f64 {
@@ -74,7 +76,8 @@ impl Edges {
         }
     }
 
-    /// The way beyond an edge whose error the share of the time is above, m; 0 where there is no error for so long.
+    /// The way beyond an edge whose error the share of the time is above, m; 0 where there is no error for so
+    /// long.
     fn way_at(&self, rounding: f64, lag: f64, share: f64) -> f64 {
         let arc = self.turn / rounding;
         let between = share * self.apart;
@@ -84,7 +87,8 @@ impl Edges {
     }
 }
 
-/// How far the surface has fallen away from the plane of the face before an edge, a way behind it, m; infinite where nothing is there.
+/// How far the surface has fallen away from the plane of the face before an edge, a way behind it, m;
+/// infinite where nothing is there.
 #[must_use]
 pub fn fall(turn: f64, rounding: f64, way: f64) -> f64 {
     let arc = turn / rounding;
@@ -131,7 +135,8 @@ mod tests {
         }
     }
 
-    /// Way beyond the edge whose error is exceeded for a share of the time, by trying every place of a long straight way.
+    /// Way beyond the edge whose error is exceeded for a share of the time, by trying every place of a long
+    /// straight way.
     fn by_trial(edges: &Edges, rounding: f64, lag: f64, share: f64) -> f64 {
         let normal = |s: f64| (s.max(0.0) * rounding).min(edges.turn);
         let mut errors: Vec<f64> = (0..100_000)

@@ -113,7 +113,8 @@ impl SceneNeed {
         contacts.fold(0.0, |most, contact| most.max(contact.curvature()))
     }
 
-    /// What late sets make of the contacts, the worst of each, with meshes that are so far off their files, m, god-object first.
+    /// What late sets make of the contacts, the worst of each, with meshes that are so far off their files,
+    /// m, god-object first.
     #[must_use]
     pub fn late(&self, rate: f64, rounds: u32, mesh_errors: &[f64]) -> Late {
         let contacts = self.contacts(mesh_errors);

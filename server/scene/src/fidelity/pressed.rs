@@ -51,7 +51,8 @@ impl Pressed {
         }
     }
 
-    /// The torque of a force whose direction is off by an angle, rad, in just-noticeable differences; 0 where the body cannot turn.
+    /// The torque of a force whose direction is off by an angle, rad, in just-noticeable differences; 0 where
+    /// the body cannot turn.
     #[must_use]
     pub fn felt_torque(&self, angle: f64) -> f64 {
         if self.turns {

@@ -11,7 +11,8 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Of a body along poses between which it goes straight, `depth`, m, away from them at most; `None` without a pose.
+    /// Of a body along poses between which it goes straight, `depth`, m, away from them at most; `None`
+    /// without a pose.
     #[must_use]
     pub fn of(body: &Mesh, path: &[Pose], depth: f64) -> Option<Self> {
         let [low, high] = body.bounding_box();
@@ -39,7 +40,8 @@ impl Reach {
         })
     }
 
-    /// The part of a convex polygon, or of a segment, that is within; in the frame of the box. Empty where none is.
+    /// The part of a convex polygon, or of a segment, that is within; in the frame of the box. Empty where
+    /// none is.
     #[must_use]
     pub fn clipped(&self, corners: &[Point3<f64>]) -> Vec<Point3<f64>> {
         let mut left = corners.to_vec();

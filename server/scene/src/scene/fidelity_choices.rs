@@ -3,7 +3,8 @@
 use crate::fidelity::errors::force_jnd;
 use crate::fidelity::{BodyNeed, Choice, Chosen, FidelitySpec, Fixed, Origin, Parts, SceneNeed};
 
-/// What vision may lag behind touch, s (Di Luca and Mahnan 2019), and what of a body's way is seen, m: a pixel at arm's length.
+/// What vision may lag behind touch, s (Di Luca and Mahnan 2019), and what of a body's way is seen, m: a
+/// pixel at arm's length.
 const VISION_LAG: f64 = 0.015;
 const PIXEL: f64 = 1.5e-3;
 /// Fewest and most states per second, Hz: as most screens, and as the forces.

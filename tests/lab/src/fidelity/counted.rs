@@ -18,7 +18,8 @@ pub struct Counted {
 }
 
 impl Counted {
-    /// At the scene's start, which has to be free, with the set of an update there: a session has run before its hand goes.
+    /// At the scene's start, which has to be free, with the set of an update there: a session has run before
+    /// its hand goes.
     pub fn new(scene: &Scene, device: &Pose) -> Self {
         let mut simulation = GodObject::new(scene.world.clone(), scene.settings, scene.start)
             .unwrap_or_else(|error| panic!("{error}"));

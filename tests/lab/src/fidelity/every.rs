@@ -158,7 +158,8 @@ fn usage(recipe: &Recipe) -> Usage {
     }
 }
 
-/// The shipped scenes, the device where the hand means to be. One whose files are not there is told and left out, and so is one whose obstacle moves and
+/// The shipped scenes, the device where the hand means to be. One whose files are not there is told and left
+/// out, and so is one whose obstacle moves and
 /// turns the body: there is no right answer for it.
 fn shipped() -> Result<Vec<Recipe>, SceneError> {
     let mut recipes = Vec::new();

@@ -85,7 +85,8 @@ pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
     with_hands(scenes, directory)
 }
 
-/// The same with the hand's path in each scene file, as its author knows it: where the hand does not come, nothing is met.
+/// The same with the hand's path in each scene file, as its author knows it: where the hand does not come,
+/// nothing is met.
 pub(super) fn with_hands(
     scenes: Vec<FidelityScene>,
     directory: &Path,

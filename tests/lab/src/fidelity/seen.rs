@@ -45,7 +45,8 @@ fn scene(
     }
 }
 
-/// On a circle of this radius about the y axis, `depth` inside it once pressed, with this speed along it, m/s; from its top on.
+/// On a circle of this radius about the y axis, `depth` inside it once pressed, with this speed along it,
+/// m/s; from its top on.
 fn around(radius: f64, depth: f64, speed: f64) -> impl Fn(f64) -> Pose + Send + Sync {
     move |time| {
         let angle = speed * on(time) / radius;

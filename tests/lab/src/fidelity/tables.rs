@@ -47,7 +47,8 @@ pub fn table(swept: &[Swept]) -> String {
     text
 }
 
-/// CSV of the choices within a time: what was predicted and measured of them, and the least error of any setting that fast.
+/// CSV of the choices within a time: what was predicted and measured of them, and the least error of any
+/// setting that fast.
 pub fn within_times(swept: &[Swept]) -> String {
     let mut text =
         "scene,time_us,rate_hz,rounds,predicted_us,measured_us,predicted_j,j,least_j_that_fast\n"

@@ -14,7 +14,8 @@ pub struct Conditions {
     pub delay: f64,
     /// f, Hz.
     pub updates: u32,
-    /// Share of the way to the device that a god-object covers in an update, where it is not the method's own.
+    /// Share of the way to the device that a god-object covers in an update, where it is not the method's
+    /// own.
     pub k_s: Option<f64>,
     /// b, N s/m.
     pub damping: f64,

@@ -22,7 +22,8 @@ const DISTURBANCE_ALONG: f64 = 1e-3;
 const HOLLOW: f64 = 0.02;
 const FACETS: usize = 360;
 const BLOCK: f64 = 0.03;
-/// Sides of the peg, which is as round as the ball, and of its hole: corners of the one face the middles of the other's, so that the middle of the peg has
+/// Sides of the peg, which is as round as the ball, and of its hole: corners of the one face the middles of
+/// the other's, so that the middle of the peg has
 /// a polygon of as many sides to move in, one of them below. Half of the peg's length and clearance, m.
 const SIDES: usize = 72;
 const PEG: f64 = 0.03;
@@ -44,7 +45,8 @@ pub enum Contact {
     Hollow,
     /// The same, and the ball is a mesh of 320 triangles.
     MeshInHollow,
-    /// A peg against the side of its hole about y: it moves across the hole, and the normal turns about the hole's axis.
+    /// A peg against the side of its hole about y: it moves across the hole, and the normal turns about the
+    /// hole's axis.
     PegInHole,
 }
 

@@ -13,7 +13,8 @@ pub const PREDICTIONS: &str = include_str!("../../../data/held-out.csv");
 /// First line of the predictions.
 const COLUMNS: &str = "scene,rate_hz,gap_tolerance_m,rounds,mesh_error_m,predicted_j\n";
 
-/// What the scenes choose and foretell, from their files alone: the CSV that is committed before anything is run.
+/// What the scenes choose and foretell, from their files alone: the CSV that is committed before anything is
+/// run.
 pub fn predictions(scenes: &[FidelityScene], directory: &Path) -> Result<String, SceneError> {
     let mut csv = COLUMNS.to_owned();
     for scene in scenes {
@@ -27,7 +28,8 @@ pub fn predictions(scenes: &[FidelityScene], directory: &Path) -> Result<String,
     Ok(csv)
 }
 
-/// The verdict on what was chosen: a table of Markdown, and how many choices are within the budget or have no setting that is.
+/// The verdict on what was chosen: a table of Markdown, and how many choices are within the budget or have no
+/// setting that is.
 pub fn verdict(swept: &[Swept]) -> (String, usize) {
     let mut text = "| scene | rate, Hz | rounds | J predicted | J measured | cost over the least within the budget | verdict |\n| --- | --- | --- | --- | --- | --- | --- |\n".to_owned();
     let mut kept = 0;

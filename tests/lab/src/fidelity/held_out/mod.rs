@@ -8,5 +8,6 @@
 
 pub mod choice;
 pub mod front;
+mod moving;
 pub mod scenes;
 mod solids;

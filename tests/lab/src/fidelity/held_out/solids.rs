@@ -32,7 +32,8 @@ pub(super) fn egg(radius: f64, subdivisions: u32, flat: f64) -> RawMesh {
     raw
 }
 
-/// A slab about the origin in x and y, whose upper side is as high as said, m, on a grid of so many cells of this size, m; its lower side is `low`.
+/// A slab about the origin in x and y, whose upper side is as high as said, m, on a grid of so many cells of
+/// this size, m; its lower side is `low`.
 pub(super) fn relief(
     [nx, ny]: [u32; 2],
     cell: f64,
