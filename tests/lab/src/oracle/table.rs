@@ -269,7 +269,7 @@ mod tests {
         let moved = read.poses[1].inverse() * pose;
         assert!(moved.translation.vector.norm() < 2e-10 && moved.rotation.angle() < 2e-10);
         assert_eq!((read.fineness, read.force_error), (fineness, 1.5e-4));
-        assert_eq!(Table::parse(&text.replace("0,1.2", "0;1.2")), None);
+        assert_eq!(Table::parse(&text.replace("-0.5,3", "-0.5;3")), None);
     }
 
     #[test]
