@@ -30,12 +30,8 @@ const SHOWS: [&str; 11] = [
     "src/sweeps",
 ];
 
-/// What an answer of the oracle depends on, beside its scene.
-const ORACLE: [&str; 1] = ["src/oracle"];
-
 fn main() {
     for (name, sources) in [
-        ("TAUT_ORACLE_SOURCES", &ORACLE[..]),
         ("TAUT_METHOD_SOURCES", &METHOD[..]),
         ("TAUT_LAB_SOURCES", &LABORATORY[..]),
     ] {

@@ -75,8 +75,6 @@ pub enum Ideal {
     Closed(Box<dyn Fn(f64) -> Vector6 + Send + Sync>),
     /// A table of the independent [`oracle`](crate::oracle)'s.
     Oracle,
-    /// A run of the same oracle, made when it is asked for.
-    Followed,
     /// A run of this project's method with fine steps, which says how far it is from its own limit: see [`mod@reference`].
     Reference,
     /// None: the recipe is judged by what must hold of any answer.
@@ -213,7 +211,6 @@ impl Recipe {
                 Answer::exact((0..self.ticks()).map(|tick| formula(f64::from(tick) * TICK)))
             }
             Ideal::Oracle => oracle::of(self),
-            Ideal::Followed => oracle::followed(self),
             Ideal::Reference => reference::of(self),
             Ideal::None => Answer::exact(std::iter::empty()),
         })

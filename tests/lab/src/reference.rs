@@ -110,17 +110,12 @@ pub(crate) fn of(recipe: &Recipe) -> Answer {
         recipe.moving.is_none(),
         "{recipe:?}: no obstacle moves in a reference run; give the right answer as a formula"
     );
-    cached(recipe, &content(recipe), || converge(recipe))
-}
-
-/// The answer of a recipe that was kept under `content`, or what `make` makes, which is then kept.
-pub(crate) fn cached(recipe: &Recipe, content: &str, make: impl FnOnce() -> Answer) -> Answer {
-    let file = directory().join(format!("{}-{content}.bin", recipe.name));
+    let file = directory().join(format!("{}-{}.bin", recipe.name, content(recipe)));
     let cached = fs::read(&file)
         .ok()
         .and_then(|bytes| Answer::from_bytes(&bytes, recipe.ticks() as usize));
     cached.unwrap_or_else(|| {
-        let answer = make();
+        let answer = converge(recipe);
         // Renamed when it is whole: tests run side by side. A cache that cannot be written costs time and nothing else.
         let turn = PARTS.fetch_add(1, Ordering::Relaxed);
         let part = file.with_extension(format!("{}-{turn}.part", std::process::id()));

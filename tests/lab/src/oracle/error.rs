@@ -3,10 +3,8 @@
 use god_object::Vector6;
 use god_object::spatial::{angular, linear};
 
-use super::{Fineness, Followed, follow, table};
+use super::{Fineness, Followed};
 use crate::cpu_time::quantile;
-use crate::recipe::Recipe;
-use crate::reference::{self, Answer};
 
 /// The run that is kept, and those whose differences from it are its error.
 pub(super) const VARIANTS: [&str; 3] = ["kept", "half the clearance", "half the step"];
@@ -46,25 +44,4 @@ pub(super) fn errors(runs: &[Followed]) -> [f64; 2] {
         }
     }
     errors
-}
-
-/// The answer of a recipe without a table, from the cache where it is there.
-pub(crate) fn followed(recipe: &Recipe) -> Answer {
-    let content = format!(
-        "oracle-{}-{}",
-        env!("TAUT_ORACLE_SOURCES"),
-        table::scene_and_motion(recipe)
-    );
-    reference::cached(recipe, &content, || {
-        let runs: Vec<Followed> = (0..VARIANTS.len())
-            .map(|index| follow(recipe, variant(index)))
-            .collect();
-        let [force_error, torque_error] = errors(&runs);
-        Answer {
-            wrenches: runs[0].wrenches.clone(),
-            force_error,
-            torque_error,
-            steps: variant(0).samples,
-        }
-    })
 }

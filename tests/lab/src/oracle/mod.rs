@@ -19,7 +19,6 @@ mod solid;
 mod table;
 
 pub use command::run as command;
-pub(crate) use error::followed;
 pub use rest::{Account, Fineness, Rest};
 pub use table::{POSE_EVERY, Table, of};
 
