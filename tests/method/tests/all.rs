@@ -14,6 +14,7 @@ mod edges;
 mod geometry_shapes;
 mod ghost_plane;
 mod hand_traces;
+mod jamming;
 mod machined_parts;
 mod peg_clearances;
 mod scales;
