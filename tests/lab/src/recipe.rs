@@ -73,7 +73,7 @@ impl Probe {
 pub enum Ideal {
     /// A formula: the wrench of the exact quasi-static problem at a time, s, in N and N m.
     Closed(Box<dyn Fn(f64) -> Vector6 + Send + Sync>),
-    /// A table of the independent [`oracle`](crate::oracle)'s.
+    /// A table of the independent [`crate::oracle`]'s.
     Oracle,
     /// A run of this project's method with fine steps, which says how far it is from its own limit: see [`mod@reference`].
     Reference,

@@ -1,6 +1,6 @@
 //! Twelve scenes of kinds that nothing was tuned for: what is foretold of them was written down before any of them was run.
 //!
-//! - [`scenes`]: the scenes; [`solids`]: their meshes.
+//! - [`scenes`]: the scenes; `solids`: their meshes.
 //! - [`choice`]: what `fidelity = "auto"` chooses and foretells of them.
 //! - [`front`]: which methods are within the budget in them at each rate, and which of those is the cheapest.
 //!
