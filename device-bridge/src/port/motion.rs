@@ -60,12 +60,12 @@ impl Motion {
     }
 
     /// Nothing is known of the motion any more.
-    pub fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         *self = Self::default();
     }
 
     /// Time that the newest travel took; zero before any.
-    pub fn span(&self) -> Duration {
+    pub(super) fn span(&self) -> Duration {
         self.span
     }
 

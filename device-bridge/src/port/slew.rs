@@ -37,9 +37,9 @@ pub struct Slewed {
     /// N, N m.
     pub wrench: Vector6<f64>,
     /// Change of the force that was asked for, where it was too large for a whole period, N.
-    pub force_asked: Option<f64>,
+    pub(super) force_asked: Option<f64>,
     /// The same for the torque, N m.
-    pub torque_asked: Option<f64>,
+    pub(super) torque_asked: Option<f64>,
 }
 
 /// How fast one part of the wrench may change.
@@ -95,12 +95,12 @@ impl SlewLimit {
     }
 
     /// What the hand feels since the last write.
-    pub fn rendered(&self) -> &Vector6<f64> {
+    pub(super) fn rendered(&self) -> &Vector6<f64> {
         &self.rendered
     }
 
     /// The hand feels nothing any more: the driver has let go.
-    pub fn let_go(&mut self) {
+    pub(super) fn let_go(&mut self) {
         self.rendered = Vector6::zeros();
     }
 
