@@ -1,8 +1,9 @@
-"""The league of engines: truth, tuning on training hands, the judged hands, a CSV file and a chart.
+"""The league of engines: truth, tuning on training hands, the judged hands, a CSV file.
 
     scripts/league                          everything; answers and runs are kept in target/league and not done twice
     scripts/league --scenes "peg; box" --engines "taut; MuJoCo"
-    scripts/league --chart                  the chart and the table alone, from the CSV file
+
+Rows that are not made anew stay. Picture and table are drawn from the file by scripts/laboratory.
 """
 
 import argparse
@@ -123,11 +124,15 @@ def keep(row):
 
 
 def write():
-    """All rows that were kept, as the CSV file."""
-    rows = [json.loads(path.read_text()) for path in (WORK / "rows").glob("*.json")]
+    """The CSV file: its rows, those made since in place of theirs."""
+    with CSV.open(newline="") as file:
+        rows = {(row["engine"], row["scene"]): row for row in csv.DictReader(file)}
+    for path in (WORK / "rows").glob("*.json"):
+        row = json.loads(path.read_text())
+        rows[row["engine"], row["scene"]] = row
     order = [scene.name for scene in [scenes.wiring(), *scenes.all_scenes()]]
     names = ["oracle, half steps", *[engine.label for engine in engines.ALL]]
-    rows = sorted((row for row in rows if row["scene"] in order), key=lambda row: (order.index(row["scene"]), names.index(row["engine"])))
+    rows = sorted((row for row in rows.values() if row["scene"] in order), key=lambda row: (order.index(row["scene"]), names.index(row["engine"])))
     columns = ["engine", "version", "scene", "settings"]
     for row in rows:
         columns += [name for name in row if name not in columns and name != "fault"]
@@ -145,27 +150,22 @@ def main():
     parser.add_argument("--engines", default="", help="likewise")
     parser.add_argument("--truth", action="store_true", help="the oracle's answers alone")
     parser.add_argument("--again", action="store_true", help="rows that are there already, too")
-    parser.add_argument("--chart", action="store_true", help="chart and table from the CSV file")
     arguments = parser.parse_args()
     wanted = lambda name, parts: not parts or any(part.strip() in name for part in parts.split(";"))
     chosen = [scene for scene in scenes.all_scenes() if wanted(scene.name, arguments.scenes)]
     players = [engine for engine in engines.ALL if wanted(engine.label, arguments.engines)]
-    if not arguments.chart:
-        for scene in chosen:
-            for which, finer in (("train", 1), ("judge", 1), ("judge", 2)):
-                truth(scene, which, finer)
-            if arguments.again or not kept("oracle, half steps", scene.name).exists():
-                keep(halved(scene))
-        if arguments.truth:
-            return
-        for player in players:
-            for scene in [scenes.wiring(), *chosen]:
-                if arguments.again or not kept(player.label, scene.name).exists():
-                    keep(wired(player) if scene.name == "wiring" else compete(player, scene))
+    for scene in chosen:
+        for which, finer in (("train", 1), ("judge", 1), ("judge", 2)):
+            truth(scene, which, finer)
+        if arguments.again or not kept("oracle, half steps", scene.name).exists():
+            keep(halved(scene))
+    if arguments.truth:
+        return
+    for player in players:
+        for scene in [scenes.wiring(), *chosen]:
+            if arguments.again or not kept(player.label, scene.name).exists():
+                keep(wired(player) if scene.name == "wiring" else compete(player, scene))
     write()
-    import chart
-
-    chart.draw(list(csv.DictReader(CSV.open())), CSV.with_suffix(".svg"))
 
 
 if __name__ == "__main__":

@@ -56,6 +56,11 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         print!("{}", papers::table(&papers::figures()));
         return Ok(ExitCode::SUCCESS);
     }
+    if std::env::args().nth(1).as_deref() == Some("league") {
+        let directory = std::env::args().nth(2);
+        taut_lab::page::league::write(Path::new(directory.as_deref().unwrap_or(DIRECTORY)))?;
+        return Ok(ExitCode::SUCCESS);
+    }
     if std::env::args().nth(1).as_deref() == Some("oracle") {
         let names: Vec<String> = std::env::args().skip(2).collect();
         return taut_lab::oracle::command(&names);
@@ -168,12 +173,14 @@ taut-lab fidelity [--quick] [--seen | --held-out | --predict | --front | --every
 taut-lab --measure [--method NAME]... [--fresh] [FILE]
 taut-lab measured [FILE]
 taut-lab papers
+taut-lab league [DIRECTORY]
 taut-lab oracle [RECIPE...]
 
   report           adds all sweeps and maps, and writes report.html, a page of everything
   fidelity         what the choice of a scene's settings costs, beside every setting
   measured         replays measured contact forces through every method (tests/data/measured)
   papers           each opponent on a scene of its own paper, beside what is published
+  league           picture and table of taut beside other engines, from the committed rows of scripts/league
   oracle           makes the tables of right answers anew (tests/lab/data/oracle), of some recipes or of all
   --measure        makes the table of costs anew (tests/lab/data/costs.csv): on a quiet machine; of --method NAME alone where that is given
   --quick          a part of the cases

@@ -1,6 +1,7 @@
 //! The report: one HTML file that needs nothing else and no network. Every figure says in which row of which CSV file it stands.
 
 mod glance;
+pub mod league;
 mod reading;
 pub mod traces;
 

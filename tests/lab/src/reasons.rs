@@ -41,6 +41,22 @@ pub fn write(scores: &[Score], directory: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// The line in words, one to a row of the head.
+fn words(line: &str) -> Vec<&str> {
+    match line {
+        "j_p95" => vec!["error felt:", "J > 0.5 for", "5 % of time"],
+        "j_share_above_1" => vec!["error felt:", "J > 1 for", "1 % of time"],
+        "step" => vec!["force", "jumps"],
+        "false_force" => vec!["force off", "by 0.1 N", "too long"],
+        "intersections" => vec!["poses in", "which bodies", "intersect"],
+        "penetration" => vec!["bodies", "intersect:", "depth"],
+        "astray" => vec!["body ends", "on the", "wrong side"],
+        "first_force_depth" => vec!["first force", "comes late"],
+        "force_p95" => vec!["force", "differs"],
+        other => other.split('_').collect(),
+    }
+}
+
 /// A column of the picture: its name, and the lines that it counts.
 type Column = (String, Vec<&'static str>);
 
@@ -99,10 +115,10 @@ fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
         14,
     )?;
     let column = |index: usize| NAMES + index as i32 * CELL.0;
-    write("within", (column(0) + 8, HEAD - 18), 13)?;
+    write("cases within", (column(0) + 4, 62), 13)?;
+    write("the budget", (column(0) + 4, 76), 13)?;
     for (index, (name, _)) in columns.iter().enumerate() {
-        // Names of two or three words stand in as many lines.
-        for (word, part) in name.split('_').enumerate() {
+        for (word, part) in words(name).into_iter().enumerate() {
             let place = (column(index + 1) + 4, 62 + 14 * word as i32);
             root.draw(&Text::new(part.to_owned(), place, ("sans-serif", 13)))?;
         }
@@ -124,8 +140,14 @@ fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
                 let (left, top) = (column(index), y);
                 let cell = [(left, top), (left + CELL.0 - 3, top + CELL.1 - 3)];
                 root.draw(&Rectangle::new(cell, fill.filled()))?;
+                let said = match index {
+                    0 if score.cases.len() < cases => {
+                        format!("{count} of {}", score.cases.len())
+                    }
+                    _ => count.to_string(),
+                };
                 if count > 0 || index == 0 {
-                    write(&count.to_string(), (left + 24, top + 3), 14)?;
+                    write(&said, (left + 20, top + 3), 14)?;
                 }
             }
             y += CELL.1;
