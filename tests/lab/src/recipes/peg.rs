@@ -181,7 +181,7 @@ fn tilted(extent: Extent) -> Recipe {
 }
 
 /// Why the peg that is brought in misses what is felt.
-const AT_THE_RIM: &str = "for about 100 ms at the rim the body is elsewhere than the right answer; a shorter rest distance changes nothing, and why is not known";
+const AT_THE_RIM: &str = "between two places where the rim holds the peg it falls, and a sub-step of the fall goes past the next one: the peg is in the hole about 100 ms early, at any rest distance";
 
 /// R18: the tip on the upper face, slid over the hole, and in, a millimetre off the middle.
 fn inserted() -> Recipe {
