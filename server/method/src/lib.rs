@@ -91,7 +91,6 @@ mod obstacle_work;
 mod prepared_rows;
 pub mod quasi_statics;
 mod settings;
-pub mod shape;
 pub mod spatial;
 pub mod surface;
 mod turn_memory;
@@ -99,12 +98,11 @@ mod world;
 
 pub use constraint::{ConstraintSet, NonPenetrationConstraint};
 pub use coupling::{Coupling, CouplingOutput};
-pub use geometry::Mesh;
+pub use geometry::{Mesh, Primitive};
 pub use god_object::{GodObject, StartError, StepReport};
 pub use nalgebra;
 pub use quasi_statics::{ProjectionStatus, SolverKind};
 pub use settings::{Adaptation, RotationMetric, Settings, SettingsError};
-pub use shape::Primitive;
 pub use spatial::{Pose, Vector6};
 pub use surface::{
     HeightMap, HeightMapTexture, ShadedAcceleration, TextureCoordinates, UvHeightMapTexture,

@@ -6,9 +6,9 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::geometry::Mesh;
+use crate::geometry::{Primitive, PrimitiveError};
 use crate::quasi_statics::Metric;
 use crate::settings::{RotationMetric, Settings};
-use crate::shape::Primitive;
 use crate::spatial::Pose;
 use crate::surface::{HeightMapTexture, UvHeightMapTexture};
 
@@ -120,6 +120,25 @@ pub struct World {
 }
 
 impl World {
+    /// Says which primitive cannot be used, by its body's name, and why.
+    pub(crate) fn check_primitives(&self) -> Result<(), (String, PrimitiveError)> {
+        if let Some(primitive) = &self.body.primitive {
+            let bounded = match primitive {
+                Primitive::Plane { .. } => Err(PrimitiveError::Unbounded),
+                _ => primitive.validate(),
+            };
+            bounded.map_err(|error| ("god-object".to_owned(), error))?;
+        }
+        for obstacle in &self.obstacles {
+            if let Some(primitive) = &obstacle.primitive {
+                primitive
+                    .validate()
+                    .map_err(|error| (obstacle.name.clone(), error))?;
+            }
+        }
+        Ok(())
+    }
+
     /// Defaults for these shapes from defaults for their size, see [`Settings::for_exact_shapes`].
     #[must_use]
     pub fn settings_for(&self, defaults: Settings) -> Settings {

@@ -2,9 +2,8 @@
 
 use crate::shape_support::{Form, forms, obstacles, oracle_distance, turned, vectors};
 use god_object::collision::{CollisionWorkspace, Work, shapes_intersect, surfaces_intersect};
-use god_object::constraint::{Contact, Feature};
+use god_object::constraint::{Contact, Feature, collect_contacts};
 use god_object::nalgebra::{UnitQuaternion, Vector3};
-use god_object::shape;
 use god_object::{Pose, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -15,7 +14,7 @@ const EXACT: f64 = 1e-9;
 
 fn contacts(form: Form, at: &Pose, obstacle: Form, pose: &Pose, distance: f64) -> Vec<Contact> {
     let mut out = Vec::with_capacity(512);
-    let collected = shape::collect(
+    let collected = collect_contacts(
         &form.body(),
         at,
         &obstacle.obstacle("obstacle", *pose),
@@ -47,7 +46,7 @@ fn a_collection_is_complete_no_farther_than_what_found_room() {
     assert_eq!(all.len(), 4);
     for room in 1..=5 {
         let mut out = Vec::with_capacity(room);
-        let collected = shape::collect(
+        let collected = collect_contacts(
             &cube.body(),
             &pose,
             &plane.obstacle("obstacle", Pose::identity()),

@@ -5,11 +5,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::Mesh;
 use crate::geometry::volume::Volume;
 use crate::geometry::wide_tree::WideTree;
-use crate::shape::Primitive;
-use crate::shape::primitive::{across, unit_axis};
+use crate::geometry::{Mesh, Primitive, across, unit_axis};
+use crate::spatial::Pose;
 use crate::world::{Body, Obstacle};
 
 /// What a half-space reaches along its boundary, m: more than the motions that are searched.
@@ -44,11 +43,11 @@ impl<'a> From<&'a Obstacle> for Collider<'a> {
 
 /// A disc that is swept along its axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Disc {
+pub(super) struct Disc {
     /// m.
-    pub(crate) radius: f64,
+    pub(super) radius: f64,
     /// Unit.
-    pub(crate) axis: Vector3<f64>,
+    pub(super) axis: Vector3<f64>,
 }
 
 /// What is swept over the pieces of a body and an obstacle.
@@ -81,6 +80,18 @@ impl Swept {
     }
 }
 
+/// Bound on how far a body is from an obstacle at least, m, with its reference point at `center`, world, and however it is turned.
+pub(crate) fn distance_at_least(
+    body: &Body,
+    center: &Point3<f64>,
+    obstacle: &Obstacle,
+    obstacle_pose: &Pose,
+) -> f64 {
+    let center = obstacle_pose.inverse_transform_point(center);
+    let radius = Collider::from(body).radius_about(&body.reference_point);
+    Collider::from(obstacle).distance(&center) - radius
+}
+
 impl Collider<'_> {
     /// Largest coordinate, m: rounding is relative to it. For a half-space, of its point.
     pub(super) fn reach(&self) -> f64 {
@@ -97,6 +108,25 @@ impl Collider<'_> {
             Self::Mesh(mesh) => mesh.box_distance(point),
             Self::Primitive(primitive) => primitive.nearest(point).distance,
         }
+    }
+
+    /// A ball that it lies in: centre and radius, m.
+    pub(super) fn ball(&self) -> (Point3<f64>, f64) {
+        let primitive = match self {
+            Self::Mesh(mesh) => {
+                let all = &mesh.tree().nodes()[0];
+                return (all.center, all.radius);
+            }
+            Self::Primitive(primitive) => primitive,
+        };
+        let middle = match primitive {
+            Primitive::Sphere { center, .. } => *center,
+            Primitive::Capsule { ends, .. } | Primitive::Cylinder { ends, .. } => {
+                nalgebra::center(&ends[0], &ends[1])
+            }
+            Primitive::Plane { point, .. } => *point,
+        };
+        (middle, primitive.radius_about(&middle))
     }
 
     /// Bound on the distance of any point from `point`, m.
@@ -142,42 +172,32 @@ impl Collider<'_> {
             Self::Mesh(mesh) => return mesh.wide_tree(),
             Self::Primitive(primitive) => primitive,
         };
+        let (mut middle, mut radius) = self.ball();
         // Axes of the slab and of the strip; the slab's middle and half its thickness; half the strip's sides; half those of the box.
-        let (middle, axes, slab, strip, half) = match primitive {
-            Primitive::Sphere { center, radius } => {
+        let (axes, slab, strip, half) = match primitive {
+            Primitive::Sphere { radius, .. } => {
                 let axes = [Vector3::z(), Vector3::x()];
                 let half = Vector3::repeat(*radius);
-                (*center, axes, [0.0, *radius], [*radius; 2], half)
+                (axes, [0.0, *radius], [*radius; 2], half)
             }
             Primitive::Capsule { ends, radius } | Primitive::Cylinder { ends, radius } => {
                 let axis = unit_axis(ends);
                 let half_length = 0.5 * (ends[1] - ends[0]).norm();
-                let middle = nalgebra::center(&ends[0], &ends[1]);
                 let (past, sideways) = match primitive {
                     Primitive::Capsule { .. } => (*radius, Vector3::repeat(1.0)),
                     _ => (0.0, axis.map(|x| (1.0 - x * x).max(0.0).sqrt())),
                 };
                 let half = axis.abs() * half_length + sideways * *radius;
                 let axes = [across(&axis), axis];
-                (
-                    middle,
-                    axes,
-                    [0.0, *radius],
-                    [half_length + past, *radius],
-                    half,
-                )
+                (axes, [0.0, *radius], [half_length + past, *radius], half)
             }
             Primitive::Plane { normal, point } => {
                 let height = normal.dot(&(center - point));
                 let depth = height.abs() + size;
                 let (axes, endless) = ([*normal, across(normal)], Vector3::repeat(ENDLESS));
-                let middle = center - normal * height;
-                (middle, axes, [-depth, depth], [ENDLESS; 2], endless)
+                (middle, radius) = (center - normal * height, depth);
+                (axes, [-depth, depth], [ENDLESS; 2], endless)
             }
-        };
-        let radius = match primitive {
-            Primitive::Plane { .. } => slab[1],
-            _ => primitive.radius_about(&middle),
         };
         let mut volume = Volume::of_piece(&middle, axes, slab, strip, half, radius);
         if self.is_half_space() {

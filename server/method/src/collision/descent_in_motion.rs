@@ -14,8 +14,8 @@ use super::turned::TurnedNodes;
 use super::windows::{Window, Windows};
 use super::work::Work;
 use super::workspace::CollisionWorkspace;
+use crate::geometry::Primitive;
 use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
-use crate::shape::Primitive;
 
 /// When volumes come near is worked out where the body moves by more than this share of the larger one's radius in half an interval. Otherwise
 /// they count as near in all of the window of what they are in, which is the cheaper test.

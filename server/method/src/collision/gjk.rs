@@ -17,17 +17,17 @@ const SAME_POINT: f64 = 1e-28;
 
 /// A convex piece without a ball around it, in some frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Core {
+pub(super) struct Core {
     /// Corners of a triangle, ends of a segment, or a point; the last is repeated.
-    pub(crate) points: [Point3<f64>; 3],
+    pub(super) points: [Point3<f64>; 3],
     /// Swept over them.
-    pub(crate) disc: Option<Disc>,
+    pub(super) disc: Option<Disc>,
 }
 
 impl Core {
     /// The point that is farthest along `n`.
     #[inline]
-    pub(crate) fn farthest(&self, n: &Vector3<f64>) -> Point3<f64> {
+    pub(super) fn farthest(&self, n: &Vector3<f64>) -> Point3<f64> {
         let mut best = self.points[0];
         for p in &self.points[1..] {
             if n.dot(&(p - best)) > 0.0 {
@@ -46,7 +46,7 @@ impl Core {
 }
 
 /// Unit direction from `still` to `mover` along which they are apart; NaN or any where they overlap.
-pub(crate) fn direction(mover: &Core, still: &Core) -> Vector3<f64> {
+pub(super) fn direction(mover: &Core, still: &Core) -> Vector3<f64> {
     let support = |n: &Vector3<f64>| Point3::from(mover.farthest(&-n) - still.farthest(n));
     let start = mover.points[0] - still.points[0];
     let mut nearest = support(&start).coords;

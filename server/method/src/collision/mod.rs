@@ -21,6 +21,7 @@ mod intervals;
 mod known_apart;
 mod motion;
 mod moving_piece;
+mod obstacle_way;
 #[cfg(test)]
 mod processors_tests;
 mod single;
@@ -38,12 +39,13 @@ pub use time_of_impact::time_of_impact;
 pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
-pub(crate) use bands::for_nearest_triangle_pairs;
-pub(crate) use collider::Disc;
+pub(crate) use bands::{Bands, for_nearest_triangle_pairs};
+pub(crate) use collider::distance_at_least;
 pub(crate) use deepest::for_deepest_triangle_pairs;
 pub(crate) use descent::for_facing_triangle_pairs;
 pub(crate) use displacements::{MAX_MOTIONS, Motions};
 pub(crate) use facing_volumes::{FacingVolumes, Side};
-pub(crate) use gjk::{Core, direction};
 pub(crate) use motion::Placement;
-pub(crate) use workspace::{MAX_CANDIDATES, MAX_WITNESSES};
+pub(crate) use obstacle_way::{ObstacleWay, time_of_impact_of_obstacle};
+pub(crate) use turned::TurnedNodes;
+pub(crate) use workspace::{MAX_IMPLIED, MAX_WITNESSES};

@@ -11,7 +11,7 @@
 
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
-use crate::geometry::Mesh;
+use super::collider::Collider;
 use crate::spatial::{Pose, Vector6, advance_pose, angular, linear};
 
 /// Straight line for the reference point, constant axis and rate for the rotation, over t in [0, 1].
@@ -64,14 +64,19 @@ impl Placement {
         (self.center - other.center).norm() + (self.rotation - other.rotation).norm() * radius
     }
 
-    /// Whether the body there is farther than `gap` (m) from the obstacle, by the ball about its box and by the obstacle's box.
-    pub(crate) fn is_beyond(&self, gap: f64, body: &Mesh, obstacle: &Mesh) -> bool {
-        let all = &body.tree().nodes()[0];
-        obstacle.box_distance(&self.point(&all.center)) - all.radius > gap // false for NaN
+    /// Whether the body there is farther than `gap` (m) from the obstacle, by a ball about it and by the obstacle's box where that is a mesh.
+    pub(crate) fn is_beyond<'a>(
+        &self,
+        gap: f64,
+        body: impl Into<Collider<'a>>,
+        obstacle: impl Into<Collider<'a>>,
+    ) -> bool {
+        let (center, radius) = body.into().ball();
+        obstacle.into().distance(&self.point(&center)) - radius > gap // false for NaN
     }
 
     /// The obstacle as seen from the body, about its origin.
-    pub(super) fn inverse(&self) -> Self {
+    pub(crate) fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
         let origin = -(rotation * self.origin);
         Self {

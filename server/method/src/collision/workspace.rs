@@ -14,6 +14,8 @@ use crate::geometry::wide_tree::WideTree;
 
 /// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
 pub(crate) const MAX_CANDIDATES: usize = 8192;
+/// Contacts that others imply, the nearest, since there are many in a fine hollow: each direction of a bore has half.
+pub(crate) const MAX_IMPLIED: usize = 64;
 /// Pairs of pieces kept from one search to the next.
 pub(crate) const MAX_WITNESSES: usize = 64;
 
@@ -76,6 +78,8 @@ pub struct CollisionWorkspace {
     /// Of primitives, the body's and the obstacle's, in the search under way.
     pub(super) leaves: [WideTree; 2],
     pub(crate) candidates: Vec<Contact>,
+    /// Of those that others imply.
+    pub(crate) implied: Vec<Contact>,
     pub(crate) candidate_limit: usize,
 }
 
@@ -108,6 +112,7 @@ impl CollisionWorkspace {
             turned: TurnedNodes::new(),
             leaves: [WideTree::of_one_leaf(), WideTree::of_one_leaf()],
             candidates: Vec::with_capacity(candidates),
+            implied: Vec::with_capacity(2 * MAX_IMPLIED),
             candidate_limit: candidates,
         }
     }

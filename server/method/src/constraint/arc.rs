@@ -11,18 +11,16 @@
 
 use nalgebra::Vector3;
 
-use super::collect::for_bits;
 use super::cones::LOOK_AHEAD_TILT;
-use super::facing::{Facing, Pair};
 
 /// An arc is left by less than this, as the sine of an angle, for the tolerance of the cones and for rounding.
 const ARC_TOLERANCE: f64 = 2.0 * LOOK_AHEAD_TILT;
 
-/// An edge that a triangle owns, obstacle frame.
+/// An edge that a triangle owns.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arc {
-    along: Vector3<f64>,
-    normals: [Vector3<f64>; 2],
+    pub(super) along: Vector3<f64>,
+    pub(super) normals: [Vector3<f64>; 2],
 }
 
 impl Arc {
@@ -37,39 +35,5 @@ impl Arc {
         let (s, t) = (self.along.dot(m), self.along.dot(n));
         let least = (s * s).min(t * t);
         s * t > 0.0 && least > ARC_TOLERANCE * ARC_TOLERANCE * self.along.norm_squared()
-    }
-}
-
-impl Facing<'_> {
-    /// The sides of the body's triangle that it owns, by their bits; what the others are is not said.
-    #[inline]
-    pub(super) fn arcs_of_body(&self, pair: &Pair, sides: u8) -> [Arc; 3] {
-        let turned = |t: u32| self.placement.rotation * self.body.face_normal(t);
-        let own = turned(pair.a);
-        let mut arcs = [Arc {
-            along: Vector3::zeros(),
-            normals: [own; 2],
-        }; 3];
-        for_bits(sides, |i| {
-            let edge = self.body.triangle_edges(pair.a)[i];
-            arcs[i].along = pair.x[(i + 1) % 3] - pair.x[i];
-            arcs[i].normals[1] = turned(self.body.edges()[edge as usize].faces[1]);
-        });
-        arcs
-    }
-
-    /// Side `j` of the obstacle's triangle, which owns it.
-    #[inline]
-    pub(super) fn arc_of_obstacle(&self, pair: &Pair, j: usize) -> Arc {
-        let edge = self.obstacle.triangle_edges(pair.b)[j];
-        // The first of an edge's faces is its owner.
-        let other = self.obstacle.edges()[edge as usize].faces[1];
-        Arc {
-            along: pair.y[(j + 1) % 3] - pair.y[j],
-            normals: [
-                *self.obstacle.face_normal(pair.b),
-                *self.obstacle.face_normal(other),
-            ],
-        }
     }
 }

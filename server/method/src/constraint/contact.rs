@@ -36,15 +36,3 @@ pub struct Collected {
     /// Smallest gap, m; infinite when no contact is within the activation distance.
     pub gap_min: f64,
 }
-
-impl Collected {
-    /// Nothing is as near as that, m, and nothing was looked at.
-    pub(super) fn nothing_within(distance: f64) -> Self {
-        Self {
-            truncated: false,
-            complete_within: distance,
-            looked_at: 0,
-            gap_min: f64::INFINITY,
-        }
-    }
-}

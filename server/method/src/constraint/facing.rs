@@ -1,346 +1,270 @@
-//! Do two features face each other: is the separation a local minimum of the distance between the surfaces?
+//! Do two elements face each other: is the separation a local minimum of the distance between the surfaces?
 //!
 //! | symbol | name in code | unit | meaning                                                         |
 //! |--------|--------------|------|-----------------------------------------------------------------|
-//! | n      | `normal`     | –    | unit, obstacle to body                                          |
-//! | x, y   |              | m    | points on the body and on the obstacle                          |
-//! | g      | `gap`        | m    | `n.(x - y)`, in [0, activation distance]                        |
+//! | n      | `normal`     | –    | unit, from the second element to the first                      |
+//! | x, y   |              | m    | points on the first and on the second                           |
+//! | g      | `gap`        | m    | `n.(x - y)` less the balls, in [0, activation distance]         |
 //!
-//! n must lie in the normal cone of the obstacle's feature and -n in that of the body's: no surface next to the feature rises
-//! towards the other body. The normal is that of the face or the product of the edges; only where a vertex meets an edge or a vertex
-//! is it the direction of the difference. All in the obstacle's frame until the contacts are handed out.
+//! n must lie in the normal cone of the second and -n in that of the first: no surface next to the element rises towards the other
+//! one. The normal is that of the face or the product of the segments; only where a point meets a segment or a point is it the direction of the
+//! difference.
 //! Source: Ortega et al. 2007, Section 4.1; Lin and Canny 1991 (Voronoi regions of features).
 
 use nalgebra::{Point3, Vector3};
 
 use super::collect::triangle_of;
-use super::cones::{
-    LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_in_edge_cone, is_in_vertex_cone, outward_of_edge,
-};
-use super::foot::{at_corner, foot_on_side, is_over, on_side, past_end};
-use super::reentrant;
-use super::{Contact, Feature, FeaturePair};
+use super::cones::{LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE};
+use super::element::{Cone, Element, Face, Frame, Placed, Point, Row, Segment, Skin};
+use super::foot::past_end;
+use super::reentrant::{covers_outline, covers_way};
+use super::{Contact, FeaturePair};
 use crate::collision::Placement;
 use crate::geometry::Mesh;
-use crate::geometry::distance::barycentric;
 
-/// Edges at a smaller angle are parallel, as its sine: their vertices stand for them.
-const PARALLEL_SINE: f64 = 1e-6;
+/// Segments at a smaller angle are parallel, as its sine: their ends stand for them.
+pub(super) const PARALLEL_SINE: f64 = 1e-6;
 /// Points nearer than this have no direction, m: some rounding errors of a metre.
 const NO_DIRECTION: f64 = 1e-14;
+
+/// How far elements are looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    /// Activation distance, m.
+    pub(super) within: f64,
+    /// The same of rows that others imply.
+    pub(super) implied_within: f64,
+    /// Rows count beyond the end of their feature, too, where that is reentrant ([`reentrant`](super::reentrant)): for rows that are known.
+    pub(super) past_reentrant_edges: bool,
+}
+
+impl Reach {
+    pub(super) fn new(within: f64) -> Self {
+        Self {
+            within,
+            implied_within: within,
+            past_reentrant_edges: false,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn is_near(&self, gap: f64) -> bool {
+        gap >= 0.0 && gap <= self.within // false for NaN
+    }
+
+    /// Unit direction and length of a difference within the activation distance and balls of radius `round`, m; `otherwise` where it is too short to have
+    /// one.
+    #[inline(always)]
+    fn direction(
+        &self,
+        difference: &Vector3<f64>,
+        round: f64,
+        otherwise: impl FnOnce() -> Vector3<f64>,
+    ) -> Option<(Vector3<f64>, f64)> {
+        let (squared, most) = (difference.norm_squared(), self.within + round);
+        let near = squared <= most * most; // false for NaN
+        if !near {
+            return None;
+        }
+        let length = squared.sqrt();
+        let normal = if length > NO_DIRECTION {
+            difference / length
+        } else {
+            otherwise().try_normalize(0.0)?
+        };
+        Some((normal, length))
+    }
+}
+
+impl Skin<'_> {
+    /// The row of points x of this and y of the other, `length` (m) apart along `normal`, less the balls, where that lies in both cones to the tilts, rad.
+    #[inline(always)]
+    pub(super) fn row(
+        &self,
+        other: &Self,
+        [x, y]: [Point3<f64>; 2],
+        (normal, length): (Vector3<f64>, f64),
+        tilts: [f64; 2],
+    ) -> Option<Row> {
+        let facing = other.cone.holds(&normal, tilts[1]) && self.cone.holds(&-normal, tilts[0]);
+        facing.then(|| Row {
+            features: [self.feature, other.feature],
+            on_first: x - normal * self.round,
+            on_second: y + normal * other.round,
+            normal,
+            gap: length - (self.round + other.round),
+            implied: false,
+        })
+    }
+}
+
+#[inline(always)]
+pub(super) fn point_point(a: &Point, b: &Point, reach: &Reach) -> Option<Row> {
+    let round = a.skin.round + b.skin.round;
+    let apart = reach.direction(&(a.at - b.at), round, || b.skin.cone.outward())?;
+    let tilts = [NORMAL_CONE_TOLERANCE; 2];
+    a.skin.row(&b.skin, [a.at, b.at], apart, tilts)
+}
+
+/// A point over the inside of a segment. What has no edge there is let in before the body tilts onto it.
+#[inline(always)]
+pub(super) fn point_segment(a: &Point, b: &Segment, reach: &Reach) -> Option<Row> {
+    let along = b.ends[1] - b.ends[0];
+    let share = along.dot(&(a.at - b.ends[0])) / along.norm_squared();
+    if !(0.0..=1.0).contains(&share) {
+        return None;
+    }
+    let foot = b.ends[0] + along * share;
+    let round = a.skin.round + b.skin.round;
+    let apart = reach.direction(&(a.at - foot), round, || b.skin.cone.outward())?;
+    let tilt = if round > 0.0 {
+        LOOK_AHEAD_TILT
+    } else {
+        NORMAL_CONE_TOLERANCE
+    };
+    let tilts = [tilt, NORMAL_CONE_TOLERANCE];
+    a.skin.row(&b.skin, [a.at, foot], apart, tilts)
+}
+
+/// Two segments that cross.
+#[inline(always)]
+pub(super) fn segment_segment(a: &Segment, b: &Segment, reach: &Reach) -> Option<Row> {
+    let (p, q) = (a.ends[0], b.ends[0]);
+    let (u, v, r) = (a.ends[1] - p, b.ends[1] - q, p - q);
+    let (aa, bb, ab) = (u.norm_squared(), v.norm_squared(), u.dot(&v));
+    let denominator = aa * bb - ab * ab;
+    let crossing = denominator > PARALLEL_SINE * PARALLEL_SINE * aa * bb; // false for NaN
+    if !crossing {
+        return None;
+    }
+    let (c, f) = (u.dot(&r), v.dot(&r));
+    let (s, t) = (
+        (ab * f - bb * c) / denominator,
+        (aa * f - ab * c) / denominator,
+    );
+    let inside = [s, t].map(|at| (0.0..=1.0).contains(&at));
+    if inside != [true; 2] && !reach.past_reentrant_edges {
+        return None;
+    }
+    let cross = u.cross(&v);
+    let unit = cross / cross.norm();
+    let (x, y) = (p + u * s, q + v * t);
+    let round = a.skin.round + b.skin.round;
+    // Of edges by the faces at them, out of the second and into the first: the points may be too near to say.
+    let out = if round > 0.0 {
+        x - y
+    } else {
+        b.skin.cone.outward() - a.skin.cone.outward()
+    };
+    let normal = if unit.dot(&out) < 0.0 { -unit } else { unit };
+    let length = normal.dot(&(x - y));
+    if !reach.is_near(length - round) {
+        return None;
+    }
+    let tilts = [LOOK_AHEAD_TILT; 2];
+    let row = a.skin.row(&b.skin, [x, y], (normal, length), tilts);
+    row.filter(|_| {
+        (inside[0] || goes_on(a.skin.cone, u, s, &v))
+            && (inside[1] || goes_on(b.skin.cone, v, t, &u))
+    })
+}
+
+/// Whether the line of an edge on to a place past its end, in lengths, lies under the surface, or under another edge as seen along what it meets there.
+fn goes_on(cone: Cone, along: Vector3<f64>, place: f64, across: &Vector3<f64>) -> bool {
+    let Cone::Edge(Placed { mesh, frame }, e) = cone else {
+        return false;
+    };
+    let end = mesh.edges()[e as usize].vertices[usize::from(place > 0.5)];
+    let way = frame.turn_back(&(along * past_end(place)));
+    covers_way(mesh, end, &way) || covers_outline(mesh, end, &way, &frame.turn_back(across))
+}
+
+/// A point over a face; a ball also past its end, where the rows of the faces that it is over imply that of this one.
+#[inline(always)]
+pub(super) fn point_face(a: &Point, face: &Face, reach: &Reach) -> Option<Row> {
+    let height = face.normal.dot(&(a.at - face.point));
+    let gap = height - a.skin.round;
+    if !reach.is_near(gap) {
+        return None;
+    }
+    let over =
+        face.is_under(&a.at, height) || reach.past_reentrant_edges && face.goes_on_under(&a.at);
+    let may_be_past = !over && a.skin.round > 0.0 && gap <= reach.implied_within;
+    let faces = (over || may_be_past) && a.skin.cone.holds(&-face.normal, LOOK_AHEAD_TILT);
+    if !faces || may_be_past && !face.goes_on_under_ball(&a.at) {
+        return None;
+    }
+    Some(Row {
+        features: [a.skin.feature, face.feature],
+        on_first: a.at - face.normal * a.skin.round,
+        on_second: a.at - face.normal * height,
+        normal: face.normal,
+        gap,
+        implied: may_be_past,
+    })
+}
+
+/// Calls `found` for the rows of two elements, the first one first.
+pub(super) fn rows(a: &Element, b: &Element, reach: &Reach, found: &mut dyn FnMut(Row)) {
+    let row = match (a, b) {
+        (Element::Point(a), Element::Point(b)) => point_point(a, b, reach),
+        (Element::Point(a), Element::Segment(b)) => point_segment(a, b, reach),
+        (Element::Point(a), Element::Face(b)) => point_face(a, b, reach),
+        (Element::Segment(a), Element::Segment(b)) => segment_segment(a, b, reach),
+        (Element::Circle(a), Element::Point(b)) => a.beside_point(b),
+        (Element::Circle(a), Element::Segment(b)) => return a.beside_segment(b, reach, found),
+        (Element::Circle(a), Element::Face(b)) => return a.over_face(b, reach, found),
+        (Element::Circle(a), Element::Circle(b)) => return a.beside_circle(b, reach, found),
+        (_, Element::Point(_) | Element::Circle(_)) => {
+            return rows(b, a, reach, &mut |row: Row| found(row.reversed()));
+        }
+        (Element::Segment(_) | Element::Face(_), Element::Segment(_) | Element::Face(_)) => None,
+    };
+    row.into_iter().for_each(found);
+}
 
 /// Looks at features of one body and one obstacle at rest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facing<'a> {
-    pub(super) body: &'a Mesh,
-    pub(super) obstacle: &'a Mesh,
-    pub(super) placement: &'a Placement,
+    pub(super) body: Placed<'a>,
+    pub(super) obstacle: Placed<'a>,
     pub(super) obstacle_index: u16,
-    pub(super) activation_distance: f64,
-    /// Rows count beyond the end of their feature, too, where that is reentrant ([`reentrant`]): for rows that are known.
-    pub(super) past_reentrant_edges: bool,
+    pub(super) reach: Reach,
 }
 
-/// One triangle of each, corners in both frames where needed.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Pair {
-    pub(super) a: u32,
-    pub(super) b: u32,
-    /// Corners of the body's triangle, obstacle frame.
-    pub(super) x: [Point3<f64>; 3],
-    /// Corners of the obstacle's triangle.
-    pub(super) y: [Point3<f64>; 3],
-}
-
-impl Facing<'_> {
-    /// Corner `k` of the body's triangle over the obstacle's face.
-    pub(super) fn vertex_face(&self, pair: &Pair, k: usize) -> Option<Contact> {
-        let normal = *self.obstacle.face_normal(pair.b);
-        let gap = normal.dot(&(pair.x[k] - pair.y[0]));
-        let over = self.is_near(gap)
-            && (is_over(&pair.x[k], &pair.y, &normal, gap)
-                || self.past_reentrant_edges && {
-                    let place = |t| self.obstacle.corners(t);
-                    reentrant::covers_foot(self.obstacle, pair.b, place, &pair.x[k])
-                });
-        if !over {
-            return None;
-        }
-        let v = self.body.triangles()[pair.a as usize][k];
-        let outward = -self.placement.rotation.tr_mul(&normal);
-        let faces = is_in_vertex_cone(self.body, v, &outward, LOOK_AHEAD_TILT);
-        faces.then(|| {
-            let foot = pair.x[k] - normal * gap;
-            self.contact(
-                Feature::Vertex(v),
-                Feature::Face(pair.b),
-                [pair.x[k], foot],
-                normal,
-                gap,
-                (pair.b, barycentric(&foot, &pair.y, &normal)),
-            )
-        })
-    }
-
-    /// Corner `k` of the obstacle's triangle under the body's face.
-    pub(super) fn face_vertex(&self, pair: &Pair, k: usize) -> Option<Contact> {
-        let normal = -(self.placement.rotation * self.body.face_normal(pair.a));
-        let gap = normal.dot(&(pair.x[0] - pair.y[k]));
-        let over = self.is_near(gap)
-            && (is_over(&pair.y[k], &pair.x, &-normal, gap)
-                || self.past_reentrant_edges && {
-                    let place = |t| self.pair(t, pair.b).x;
-                    reentrant::covers_foot(self.body, pair.a, place, &pair.y[k])
-                });
-        if !over {
-            return None;
-        }
-        let v = self.obstacle.triangles()[pair.b as usize][k];
-        if !is_in_vertex_cone(self.obstacle, v, &normal, LOOK_AHEAD_TILT) {
-            return None;
-        }
-        let on_body = pair.y[k] + normal * gap;
-        Some(self.contact(
-            Feature::Face(pair.a),
-            Feature::Vertex(v),
-            [on_body, pair.y[k]],
-            normal,
-            gap,
-            (pair.b, at_corner(k)),
-        ))
-    }
-
-    /// Side `i` of the body's triangle across side `j` of the obstacle's.
-    pub(super) fn edge_edge(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
-        let (p, q) = (pair.x[i], pair.y[j]);
-        let (u, v, r) = (pair.x[(i + 1) % 3] - p, pair.y[(j + 1) % 3] - q, p - q);
-        let (a, e, b) = (u.norm_squared(), v.norm_squared(), u.dot(&v));
-        let denominator = a * e - b * b;
-        let crossing = denominator > PARALLEL_SINE * PARALLEL_SINE * a * e; // false for NaN
-        if !crossing {
-            return None;
-        }
-        let (c, f) = (u.dot(&r), v.dot(&r));
-        let (s, t) = ((b * f - c * e) / denominator, (a * f - b * c) / denominator);
-        let inside = [s, t].map(|at| (0.0..=1.0).contains(&at));
-        if inside != [true; 2] && !self.past_reentrant_edges {
-            return None;
-        }
-        let cross = u.cross(&v);
-        let unit = cross / cross.norm();
-        let (edge_a, edge_b) = (
-            self.body.triangle_edges(pair.a)[i],
-            self.obstacle.triangle_edges(pair.b)[j],
-        );
-        // Out of the obstacle and into the body, by the faces at the edges: the points may be too near to say.
-        let out_of_body = self.placement.rotation * outward_of_edge(self.body, edge_a);
-        let side = unit.dot(&(outward_of_edge(self.obstacle, edge_b) - out_of_body));
-        let normal = if side < 0.0 { -unit } else { unit };
-        let (x, y) = (p + u * s, q + v * t);
-        let gap = normal.dot(&(x - y));
-        let into_body = -self.placement.rotation.tr_mul(&normal);
-        let facing = self.is_near(gap)
-            && is_in_edge_cone(self.obstacle, edge_b, &normal, LOOK_AHEAD_TILT)
-            && is_in_edge_cone(self.body, edge_a, &into_body, LOOK_AHEAD_TILT)
-            && (inside[0] || {
-                let end = self.body.triangles()[pair.a as usize][(i + usize::from(s > 0.5)) % 3];
-                let [way, across] =
-                    [u * past_end(s), v].map(|d| self.placement.rotation.tr_mul(&d));
-                reentrant::covers_way(self.body, end, &way)
-                    || reentrant::covers_outline(self.body, end, &way, &across)
-            })
-            && (inside[1] || {
-                let end =
-                    self.obstacle.triangles()[pair.b as usize][(j + usize::from(t > 0.5)) % 3];
-                let way = v * past_end(t);
-                reentrant::covers_way(self.obstacle, end, &way)
-                    || reentrant::covers_outline(self.obstacle, end, &way, &u)
-            });
-        facing.then(|| {
-            self.contact(
-                Feature::Edge(edge_a),
-                Feature::Edge(edge_b),
-                [x, y],
-                normal,
-                gap,
-                (pair.b, on_side(j, t)),
-            )
-        })
-    }
-
-    /// Corner `i` of the body's triangle against side `j` of the obstacle's.
-    pub(super) fn vertex_edge(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
-        let (foot, t) = foot_on_side(&pair.x[i], &pair.y, j)?;
-        let edge = self.obstacle.triangle_edges(pair.b)[j];
-        let (normal, gap) =
-            self.direction(&(pair.x[i] - foot), &outward_of_edge(self.obstacle, edge))?;
-        let v = self.body.triangles()[pair.a as usize][i];
-        let facing = is_in_edge_cone(self.obstacle, edge, &normal, NORMAL_CONE_TOLERANCE)
-            && is_in_vertex_cone(
-                self.body,
-                v,
-                &-self.placement.rotation.tr_mul(&normal),
-                NORMAL_CONE_TOLERANCE,
-            );
-        facing.then(|| {
-            self.contact(
-                Feature::Vertex(v),
-                Feature::Edge(edge),
-                [pair.x[i], foot],
-                normal,
-                gap,
-                (pair.b, on_side(j, t)),
-            )
-        })
-    }
-
-    /// Side `i` of the body's triangle against corner `j` of the obstacle's.
-    pub(super) fn edge_vertex(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
-        let (foot, _) = foot_on_side(&pair.y[j], &pair.x, i)?;
-        let edge = self.body.triangle_edges(pair.a)[i];
-        let into_body = -(self.placement.rotation * outward_of_edge(self.body, edge));
-        let (normal, gap) = self.direction(&(foot - pair.y[j]), &into_body)?;
-        let v = self.obstacle.triangles()[pair.b as usize][j];
-        let facing = is_in_vertex_cone(self.obstacle, v, &normal, NORMAL_CONE_TOLERANCE)
-            && is_in_edge_cone(
-                self.body,
-                edge,
-                &-self.placement.rotation.tr_mul(&normal),
-                NORMAL_CONE_TOLERANCE,
-            );
-        facing.then(|| {
-            self.contact(
-                Feature::Edge(edge),
-                Feature::Vertex(v),
-                [foot, pair.y[j]],
-                normal,
-                gap,
-                (pair.b, at_corner(j)),
-            )
-        })
-    }
-
-    /// Corner `i` of the body's triangle against corner `j` of the obstacle's.
-    pub(super) fn vertex_vertex(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
-        let (normal, gap) =
-            self.direction(&(pair.x[i] - pair.y[j]), self.obstacle.face_normal(pair.b))?;
-        let (v, w) = (
-            self.body.triangles()[pair.a as usize][i],
-            self.obstacle.triangles()[pair.b as usize][j],
-        );
-        let facing = is_in_vertex_cone(self.obstacle, w, &normal, NORMAL_CONE_TOLERANCE)
-            && is_in_vertex_cone(
-                self.body,
-                v,
-                &-self.placement.rotation.tr_mul(&normal),
-                NORMAL_CONE_TOLERANCE,
-            );
-        facing.then(|| {
-            self.contact(
-                Feature::Vertex(v),
-                Feature::Vertex(w),
-                [pair.x[i], pair.y[j]],
-                normal,
-                gap,
-                (pair.b, at_corner(j)),
-            )
-        })
-    }
-
-    /// A triangle of each.
-    #[inline]
-    pub(super) fn pair(&self, a: u32, b: u32) -> Pair {
-        Pair {
-            a,
-            b,
-            x: self.body.corners(a).map(|p| self.placement.point(&p)),
-            y: self.obstacle.corners(b),
+impl<'a> Facing<'a> {
+    pub(super) fn new(
+        body: &'a Mesh,
+        obstacle: &'a Mesh,
+        placement: &'a Placement,
+        obstacle_index: u16,
+        reach: Reach,
+    ) -> Self {
+        let placed = |mesh, frame| Placed {
+            mesh,
+            frame: Frame(frame),
+        };
+        Self {
+            body: placed(body, Some(placement)),
+            obstacle: placed(obstacle, None),
+            obstacle_index,
+            reach,
         }
     }
 
     /// The contact between two features by their names, when they face each other here.
     pub(super) fn features(&self, features: &FeaturePair) -> Option<Contact> {
         let (body, obstacle) = (self.body, self.obstacle);
-        let a = triangle_of(body, features.on_body)?;
-        let b = triangle_of(obstacle, features.on_obstacle)?;
-        let pair = self.pair(a, b);
-        let corner = |mesh: &Mesh, t: u32, v: u32| {
-            let corners = mesh.triangles()[t as usize];
-            corners.iter().position(|w| *w == v)
-        };
-        let side = |mesh: &Mesh, t: u32, e: u32| {
-            let edges = mesh.triangle_edges(t);
-            edges.iter().position(|f| *f == e)
-        };
-        match (features.on_body, features.on_obstacle) {
-            (Feature::Vertex(v), Feature::Face(_)) => self.vertex_face(&pair, corner(body, a, v)?),
-            (Feature::Face(_), Feature::Vertex(w)) => {
-                self.face_vertex(&pair, corner(obstacle, b, w)?)
-            }
-            (Feature::Edge(e), Feature::Edge(f)) => {
-                self.edge_edge(&pair, side(body, a, e)?, side(obstacle, b, f)?)
-            }
-            (Feature::Vertex(v), Feature::Edge(f)) => {
-                self.vertex_edge(&pair, corner(body, a, v)?, side(obstacle, b, f)?)
-            }
-            (Feature::Edge(e), Feature::Vertex(w)) => {
-                self.edge_vertex(&pair, side(body, a, e)?, corner(obstacle, b, w)?)
-            }
-            (Feature::Vertex(v), Feature::Vertex(w)) => {
-                self.vertex_vertex(&pair, corner(body, a, v)?, corner(obstacle, b, w)?)
-            }
-            // Faces on edges and faces are their corners' contacts; features of primitives are not those of meshes.
-            _ => None,
-        }
-    }
-
-    #[inline]
-    fn is_near(&self, gap: f64) -> bool {
-        gap >= 0.0 && gap <= self.activation_distance // false for NaN
-    }
-
-    /// Unit direction and length of a difference within the activation distance; `otherwise` where it is too short to have one.
-    #[inline]
-    fn direction(
-        &self,
-        difference: &Vector3<f64>,
-        otherwise: &Vector3<f64>,
-    ) -> Option<(Vector3<f64>, f64)> {
-        let squared = difference.norm_squared();
-        let near = squared <= self.activation_distance * self.activation_distance; // false for NaN
-        if !near {
-            return None;
-        }
-        let gap = squared.sqrt();
-        let normal = if gap > NO_DIRECTION {
-            difference / gap
-        } else {
-            otherwise.try_normalize(0.0)?
-        };
-        Some((normal, gap))
-    }
-
-    fn contact(
-        &self,
-        on_body: Feature,
-        on_obstacle: Feature,
-        [x, y]: [Point3<f64>; 2],
-        normal: Vector3<f64>,
-        gap: f64,
-        (obstacle_triangle, barycentric): (u32, [f64; 3]),
-    ) -> Contact {
-        Contact {
-            features: FeaturePair {
-                obstacle: self.obstacle_index,
-                on_body,
-                on_obstacle,
-            },
-            point_on_body: x,
-            point_on_obstacle: y,
-            normal,
-            gap,
-            obstacle_triangle,
-            barycentric,
-        }
+        let a = body.triangle(triangle_of(body.mesh, features.on_body)?);
+        let b = obstacle.triangle(triangle_of(obstacle.mesh, features.on_obstacle)?);
+        let mut found = None;
+        let (on_body, on_obstacle) = (
+            a.element(features.on_body)?,
+            b.element(features.on_obstacle)?,
+        );
+        rows(&on_body, &on_obstacle, &self.reach, &mut |row| {
+            found = Some(row.contact(self.obstacle_index, Some(&b)));
+        });
+        found
     }
 }

@@ -1,12 +1,17 @@
 //! Contacts between features, and the constraint set made of them.
 
 mod arc;
+mod circle;
 mod collect;
 mod cones;
 mod contact;
+mod cores;
+mod element;
 mod facing;
 mod feature;
 mod foot;
+mod nearest;
+mod piece;
 mod reduction;
 mod reentrant;
 mod separation;
@@ -14,16 +19,12 @@ mod set;
 mod violated;
 
 pub use collect::collect_contacts;
-pub(crate) use collect::{Nearest, collect_bounded, in_world};
+pub(crate) use collect::{collect_bounded, in_world};
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
 pub(crate) use reduction::{At, MAX_ROWS, Place, Purpose, RowReduction, Surfaces, Wished};
-pub(crate) use reentrant::covers_ball;
 pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};
 pub(crate) use violated::{Violated, for_violated};
 
-pub(crate) use cones::{
-    LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_in_edge_cone, is_in_vertex_cone,
-};
-pub(crate) use foot::is_over;
+use cones::{LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE};

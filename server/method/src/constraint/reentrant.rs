@@ -130,25 +130,20 @@ fn height_over(
     inside.then_some(height)
 }
 
-/// Whether a point lies beyond triangle `t`, and there under other faces. Corners by `place`, in one frame with the point.
+/// Whether a point lies beyond triangle `t`, and there under other faces. Mesh's frame.
 ///
 /// The faces between them are passed one by one, each across a side that the point lies beyond and that does not stand out: then the next face is
 /// above the plane of the last at the point, and so above that of `t`.
-pub(super) fn covers_foot(
-    mesh: &Mesh,
-    t: u32,
-    place: impl Fn(u32) -> [Point3<f64>; 3],
-    point: &Point3<f64>,
-) -> bool {
-    foot_from(mesh, t, place, point).is_some_and(|foot| foot.face != t)
+pub(super) fn covers_foot(mesh: &Mesh, t: u32, point: &Point3<f64>) -> bool {
+    foot_from(mesh, t, point).is_some_and(|foot| foot.face != t)
 }
 
 /// The same for a ball about a point, of the faces of one flat region for one alone: that which borders on the next region.
 ///
 /// A point that lies past a reentrant side of the angle a, h above the face behind it, is h / cos(a) or more above the plane of the face before: a ball that
 /// is clear of the face that it is over is clear of the plane of `t`, too.
-pub(crate) fn covers_ball(mesh: &Mesh, t: u32, middle: &Point3<f64>) -> bool {
-    let foot = foot_from(mesh, t, |t| mesh.corners(t), middle);
+pub(super) fn covers_ball(mesh: &Mesh, t: u32, middle: &Point3<f64>) -> bool {
+    let foot = foot_from(mesh, t, middle);
     let first = foot.and_then(|foot| foot.first);
     first.is_some_and(|edge| !mesh.edges()[edge as usize].flat)
 }
@@ -161,20 +156,15 @@ pub(super) struct Foot {
     first: Option<u32>,
 }
 
-/// The face that a point is over, from triangle `t` on; `None` where a side that stands out is in the way, or the way has no end. Corners by `place`, in
-/// one frame with the point.
-pub(super) fn foot_from(
-    mesh: &Mesh,
-    t: u32,
-    place: impl Fn(u32) -> [Point3<f64>; 3],
-    point: &Point3<f64>,
-) -> Option<Foot> {
+/// The face that a point is over, from triangle `t` on; `None` where a side that stands out is in the way, or the way has no end. Mesh's
+/// frame.
+pub(super) fn foot_from(mesh: &Mesh, t: u32, point: &Point3<f64>) -> Option<Foot> {
     let mut foot = Foot {
         face: t,
         first: None,
     };
     for _ in 0..=MAX_STEPS {
-        let corners = place(foot.face);
+        let corners = mesh.corners(foot.face);
         let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
         let beyond = (0..3).find(|k| {
             let side = corners[(k + 1) % 3] - corners[*k];
@@ -318,7 +308,7 @@ pub(super) mod tests {
                 let corners = mesh.corners(t);
                 let left = corners.iter().all(|p| p.x <= 0.0) && normal.z > 0.1;
                 let point = Point3::new(0.05, 0.5, 0.0);
-                left && covers_foot(&mesh, t, |t| mesh.corners(t), &point)
+                left && covers_foot(&mesh, t, &point)
             });
             assert_eq!(covered, expected, "{depth}");
         }

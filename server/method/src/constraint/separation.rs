@@ -16,8 +16,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Feature, FeaturePair, NonPenetrationConstraint};
-use crate::geometry::Mesh;
+use super::NonPenetrationConstraint;
 use crate::spatial::Pose;
 
 /// Edges at a smaller angle are parallel, as its sine: their common normal says nothing.
@@ -64,30 +63,6 @@ pub enum Separation {
     },
 }
 
-impl Separation {
-    /// That of two features of placed meshes.
-    pub(crate) fn of(
-        features: &FeaturePair,
-        (body, body_pose): (&Mesh, &Pose),
-        (obstacle, obstacle_pose): (&Mesh, &Pose),
-    ) -> Self {
-        let along = |mesh: &Mesh, pose: &Pose, edge: u32| {
-            let [from, to] = mesh.edges()[edge as usize].vertices;
-            let vertices = mesh.vertices();
-            let difference = vertices[to as usize] - vertices[from as usize];
-            pose.rotation * (difference / difference.norm())
-        };
-        match (features.on_body, features.on_obstacle) {
-            (Feature::Face(_), _) => Self::OfBody,
-            (Feature::Edge(a), Feature::Edge(b)) => Self::OfEdges {
-                on_body: along(body, body_pose, a),
-                on_obstacle: along(obstacle, obstacle_pose, b),
-            },
-            _ => Self::OfObstacle,
-        }
-    }
-}
-
 /// A row evaluated at another pose of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovedConstraint {
@@ -131,7 +106,7 @@ impl NonPenetrationConstraint {
                 on_body: along,
                 on_obstacle,
             } => self
-                .between_lines(&x, &(turn * along), &along, &on_obstacle)
+                .between_rods(&x, [&along, &(turn * along), &on_obstacle], [0.0; 2])
                 .unwrap_or_else(|| self.off_plane(&x)),
             Separation::OfBall { radius } => {
                 // The centre moves; the lowest point is always below it.
@@ -178,7 +153,7 @@ impl NonPenetrationConstraint {
     }
 
     /// Distance of two points or lines with balls around them: the body's through `p` along `u`, which was `before`, and the obstacle's along `v`.
-    /// `None` when they meet.
+    /// `None` when they meet, and of parallel edges.
     fn between_rods(
         &self,
         p: &Point3<f64>,
@@ -194,6 +169,8 @@ impl NonPenetrationConstraint {
             let side = self.normal.dot(&before.cross(v)).signum();
             let along_obstacle = u.cross(&difference).dot(&across) / squared;
             (across * (side / squared.sqrt()), q + v * along_obstacle)
+        } else if on_body + on_obstacle == 0.0 {
+            return None;
         } else if *v == Vector3::zeros() {
             let off = difference - u * u.dot(&difference);
             (off.try_normalize(f64::MIN_POSITIVE)?, q)
@@ -211,39 +188,12 @@ impl NonPenetrationConstraint {
             gap: normal.dot(&difference) - on_body - on_obstacle,
         })
     }
-
-    /// Distance of two lines: that of the body through `x` along `u`, which was `before`, and that of the obstacle along `v`.
-    /// `None` when they are parallel.
-    fn between_lines(
-        &self,
-        x: &Point3<f64>,
-        u: &Vector3<f64>,
-        before: &Vector3<f64>,
-        v: &Vector3<f64>,
-    ) -> Option<MovedConstraint> {
-        let across = u.cross(v);
-        let squared = across.norm_squared();
-        let crossing = squared > PARALLEL_SINE * PARALLEL_SINE; // false for NaN
-        if !crossing {
-            return None;
-        }
-        // The side is the one that the lines had at x_s.
-        let side = self.normal.dot(&before.cross(v)).signum();
-        let normal = across * (side / squared.sqrt());
-        let difference = x - self.point;
-        let along_obstacle = u.cross(&difference).dot(&across) / squared;
-        Some(MovedConstraint {
-            point: self.point + v * along_obstacle,
-            normal,
-            gap: normal.dot(&difference),
-        })
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constraint::contact_jacobian;
+    use crate::constraint::{Feature, FeaturePair, contact_jacobian};
     use crate::spatial::{Vector6, advance_pose};
 
     fn rods(on_body: Vector3<f64>, on_obstacle: Vector3<f64>) -> Separation {

@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use super::Contact;
 use super::collect::{can_touch, for_contacts, in_world};
 use super::cones::LOOK_AHEAD_TILT;
-use super::facing::Facing;
+use super::facing::{Facing, Reach};
 use crate::collision::{
     CollisionWorkspace, FacingVolumes, Motions, Placement, Side, Work, for_deepest_triangle_pairs,
 };
@@ -46,14 +46,8 @@ pub(crate) fn for_violated(
         LOOK_AHEAD_TILT,
         &mut workspace.turned,
     );
-    let facing = Facing {
-        body,
-        obstacle,
-        placement: &placement,
-        obstacle_index,
-        activation_distance: asked.reach,
-        past_reentrant_edges: false,
-    };
+    let reach = Reach::new(asked.reach);
+    let facing = Facing::new(body, obstacle, &placement, obstacle_index, reach);
     let seen_by = |side, placed| {
         Motions::seen_by(side, placed, asked.motions, &asked.center, LOOK_AHEAD_TILT)
     };
@@ -69,7 +63,7 @@ pub(crate) fn for_violated(
         can_touch,
         |a, b, work| {
             let before = work.feature_pairs;
-            for_contacts(&facing, &facing.pair(a, b), work, |contact| {
+            for_contacts(&facing, [a, b], work, |contact| {
                 found(&in_world(&contact, obstacle_pose));
             });
             looked_at += 1 + work.feature_pairs - before;

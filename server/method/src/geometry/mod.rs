@@ -12,6 +12,9 @@ mod normal_cone;
 mod normals;
 mod one_sided_distance;
 mod parts;
+mod primitive;
+#[cfg(test)]
+mod primitive_tests;
 mod report;
 mod self_contact;
 mod self_intersection;
@@ -29,10 +32,12 @@ pub use normals::corner_normals;
 pub use one_sided_distance::{OneSidedDistance, one_sided_distance};
 pub(crate) use parts::surface_windings;
 pub use parts::{ClosedPart, InvertedPart, closed_parts, connected};
+pub use primitive::{NearestOnPrimitive, Primitive, PrimitiveError};
 pub use report::{MeshPlaces, MeshReport};
 pub use self_contact::{SelfContact, self_contact};
 pub use self_intersection::self_intersection;
 pub use topology::Edge;
 pub use tree::{Node, Tree};
 
+pub(crate) use primitive::{across, unit_axis};
 pub(crate) use tree::MAX_DEPTH;

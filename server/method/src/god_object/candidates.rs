@@ -98,12 +98,12 @@ impl GodObject {
         (distance, pairs): (f64, u64),
         work: &mut Work,
     ) -> Collected {
-        let obstacle = at.obstacle(index);
+        let (obstacle, pose) = at.obstacle(index);
         let contacts = &mut self.contacts;
         let mut collect_within = |reach: f64, pairs: u64, contacts: &mut Vec<Contact>| {
             collect_bounded(
-                (&at.world.body.mesh, &at.pose),
-                obstacle,
+                ((&at.world.body.mesh).into(), &at.pose),
+                (obstacle.into(), pose),
                 u16::try_from(index).unwrap_or(u16::MAX),
                 reach,
                 pairs,

@@ -8,8 +8,9 @@ use nalgebra::Vector3;
 use super::GodObject;
 use super::placed_obstacle::{Ahead, PlacedObstacle};
 use crate::collision::Work;
-use crate::constraint::{Contact, MAX_ROWS, NonPenetrationConstraint, Surfaces};
-use crate::shape;
+use crate::constraint::{
+    Contact, MAX_ROWS, NonPenetrationConstraint, Separation, Surfaces, collect_contacts,
+};
 use crate::spatial::{Pose, pose_difference};
 use crate::surface::ShadingNormals;
 use crate::world::World;
@@ -141,7 +142,7 @@ impl GodObject {
                 continue;
             }
             self.contacts.clear();
-            let collected = shape::collect(
+            let collected = collect_contacts(
                 &self.world.body,
                 &self.pose,
                 &self.world.obstacles[index],
@@ -182,7 +183,7 @@ impl GodObject {
             point: contact.point_on_obstacle,
             normal: contact.normal,
             gap: contact.gap,
-            separation: shape::separation(
+            separation: Separation::of(
                 &contact.features,
                 (&self.world.body, &self.pose),
                 (obstacle, &placed.pose),

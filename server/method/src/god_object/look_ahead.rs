@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::GodObject;
 use super::substep::Update;
-use crate::shape;
+use crate::collision::distance_at_least;
 use crate::spatial::{Pose, pose_difference};
 
 /// How much shorter a look-ahead becomes that costs too much, and how much longer one that costs little.
@@ -51,7 +51,7 @@ impl GodObject {
         let center = Point3::from(here.translation.vector);
         for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
             let body = &self.world.body;
-            let off = shape::distance_at_least(body, &center, obstacle, &placed.pose);
+            let off = distance_at_least(body, &center, obstacle, &placed.pose);
             placed.far = off > reach + placed.way(); // false for NaN
         }
     }

@@ -17,9 +17,9 @@ use nalgebra::Vector3;
 
 use super::placed_obstacle::{Ahead, PlacedObstacle};
 use super::{GodObject, StepReport};
-use crate::collision::TimeOfImpact;
+use crate::collision::{ObstacleWay, TimeOfImpact, time_of_impact_of_obstacle};
 use crate::constraint::NonPenetrationConstraint;
-use crate::shape::{self, ObstacleWay, Primitive};
+use crate::geometry::Primitive;
 use crate::spatial::{Pose, Vector6, advance_pose, pose_difference, pose_is_finite};
 
 /// Most alternations of one update: a corner in the way costs one, a squeeze ends after some.
@@ -184,7 +184,7 @@ impl GodObject {
         let (body, obstacle) = (&self.world.body, &self.world.obstacles[index]);
         let start = &self.obstacles[index].pose;
         let way = ObstacleWay::new(obstacle, start, displacement, body, &self.pose);
-        let found = shape::time_of_impact_of_obstacle(
+        let found = time_of_impact_of_obstacle(
             obstacle,
             &way,
             body,

@@ -4,8 +4,9 @@ use super::GodObject;
 use crate::collision::{
     CollisionWorkspace, Motion, TimeOfImpact, Work, shapes_intersect, time_of_impact,
 };
+use crate::constraint::collect_contacts;
+use crate::geometry::PrimitiveError;
 use crate::settings::{Settings, SettingsError};
-use crate::shape::{self, PrimitiveError, check_primitives};
 use crate::spatial::{Pose, Vector6, at_reference_point, pose_is_finite};
 use crate::world::{Body, Obstacle, World};
 
@@ -66,7 +67,9 @@ impl GodObject {
                 mass: world.body.mass,
             });
         }
-        check_primitives(world).map_err(|(name, error)| StartError::Primitive { name, error })?;
+        world
+            .check_primitives()
+            .map_err(|(name, error)| StartError::Primitive { name, error })?;
         let workspace = &mut CollisionWorkspace::new();
         for obstacle in &world.obstacles {
             if shapes_intersect(&world.body, start, obstacle, &obstacle.pose) {
@@ -117,7 +120,7 @@ fn gap(
     obstacle: &Obstacle,
     workspace: &mut CollisionWorkspace,
 ) -> f64 {
-    let collected = shape::collect(
+    let collected = collect_contacts(
         body,
         start,
         obstacle,

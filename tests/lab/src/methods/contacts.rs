@@ -1,9 +1,8 @@
 //! What the baselines share: contacts near a pose, as rows, and limits of the force.
 
 use god_object::collision::{CollisionWorkspace, Work, shapes_intersect, surfaces_intersect};
-use god_object::constraint::{Contact, Separation};
+use god_object::constraint::{Contact, Separation, collect_contacts};
 use god_object::quasi_statics::{HalfSpace, Metric, ProjectionStatus, Projector};
-use god_object::shape::collect;
 use god_object::spatial::{angular, linear, six};
 use god_object::{ConstraintSet, NonPenetrationConstraint, Pose, Settings, Vector6, World};
 use nalgebra::Point3;
@@ -30,7 +29,7 @@ impl ContactFinder {
     pub(super) fn find(&mut self, world: &World, pose: &Pose, distance: f64) -> &[Contact] {
         self.found.clear();
         for (index, obstacle) in (0..).zip(&world.obstacles) {
-            let _ = collect(
+            let _ = collect_contacts(
                 &world.body,
                 pose,
                 obstacle,

@@ -21,7 +21,7 @@
 use std::sync::Arc;
 
 use god_object::collision::surfaces_intersect;
-use god_object::shape::Primitive;
+use god_object::geometry::Primitive;
 use god_object::spatial::{
     advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference,
 };

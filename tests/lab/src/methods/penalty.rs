@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use god_object::shape::Primitive;
+use god_object::geometry::Primitive;
 use god_object::spatial::{angular, at_reference_point, linear, pose_difference, six};
 use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Point3, Vector3};

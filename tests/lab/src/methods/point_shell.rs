@@ -6,7 +6,7 @@
 
 use std::collections::HashSet;
 
-use god_object::shape::Primitive;
+use god_object::geometry::Primitive;
 use god_object::{Body, Mesh, Pose, World};
 use nalgebra::{Point3, Vector3};
 

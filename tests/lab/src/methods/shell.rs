@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
+use god_object::geometry::NearestOnPrimitive;
 use god_object::geometry::distance::closest_on_triangle;
 use god_object::geometry::nearest_on_mesh;
-use god_object::shape::Nearest;
 use god_object::{Mesh, Obstacle};
 use nalgebra::{Point3, Vector3};
 
@@ -66,7 +66,7 @@ impl DistanceField {
     }
 
     /// The nearest of the surface to a point that is inside, or outside and no farther away than `margin`, m; else `None`.
-    pub(super) fn nearest(&self, point: &Point3<f64>, margin: f64) -> Option<Nearest> {
+    pub(super) fn nearest(&self, point: &Point3<f64>, margin: f64) -> Option<NearestOnPrimitive> {
         let [low, high] = self.mesh.bounding_box();
         if !(0..3).all(|axis| (low[axis] - margin..high[axis] + margin).contains(&point[axis])) {
             return None;
@@ -90,7 +90,7 @@ impl DistanceField {
             // On the surface there is no way.
             (way.try_normalize(f64::MIN_POSITIVE)).unwrap_or_else(|| outward.normalize())
         };
-        Some(Nearest {
+        Some(NearestOnPrimitive {
             normal,
             distance: -normal.dot(&out),
         })
@@ -134,13 +134,13 @@ pub(super) fn nearest_on_obstacle(
     field: &DistanceField,
     point: &Point3<f64>,
     margin: f64,
-) -> Option<Nearest> {
+) -> Option<NearestOnPrimitive> {
     let local = obstacle.pose.inverse_transform_point(point);
     let found = match &obstacle.primitive {
         Some(primitive) => Some(primitive.nearest(&local)).filter(|n| n.distance <= margin),
         None => field.nearest(&local, margin),
     }?;
-    Some(Nearest {
+    Some(NearestOnPrimitive {
         normal: obstacle.pose.rotation * found.normal,
         ..found
     })

@@ -8,7 +8,7 @@ use super::row::{Known, face};
 use super::{MAX_ROUNDS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES};
 use crate::collision::{MAX_MOTIONS, Placement, Work};
 use crate::constraint::collect::{for_contacts, in_world};
-use crate::constraint::facing::Facing;
+use crate::constraint::facing::{Facing, Reach};
 use crate::constraint::{Contact, FeaturePair};
 use crate::geometry::Mesh;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection};
@@ -237,18 +237,13 @@ impl RowReduction {
         let (obstacle, pose) = at.obstacle(index);
         let body = &at.world.body.mesh;
         let placement = Placement::of(&at.pose, pose);
-        let facing = Facing {
-            body,
-            obstacle,
-            placement: &placement,
-            obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
-            activation_distance: TOUCHING_REST_DISTANCES * at.rest_distance,
-            past_reentrant_edges: false,
-        };
+        let index = u16::try_from(index).unwrap_or(u16::MAX);
+        let reach = Reach::new(TOUCHING_REST_DISTANCES * at.rest_distance);
+        let facing = Facing::new(body, obstacle, &placement, index, reach);
         // The features that touch may be other triangles' to look at.
         for a in owners(body, a) {
             for b in owners(obstacle, b) {
-                for_contacts(&facing, &facing.pair(a, b), work, |contact| {
+                for_contacts(&facing, [a, b], work, |contact| {
                     if !self.knows(&contact.features) {
                         let contact = in_world(&contact, pose);
                         self.add(Known::of(&contact, surfaces, &at.center()));

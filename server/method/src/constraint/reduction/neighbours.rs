@@ -74,7 +74,7 @@ pub(super) fn for_turned(
 
 /// The face that a point is over, from face `t` on; `None` past a side that stands out.
 fn face_under(mesh: &Mesh, t: u32, point: &Point3<f64>) -> Option<u32> {
-    let foot = foot_from(mesh, t, |t| mesh.corners(t), point);
+    let foot = foot_from(mesh, t, point);
     foot.map(|foot| foot.face)
 }
 

@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use super::at::{At, Purpose, Surfaces};
 use crate::collision::{Placement, Work};
 use crate::constraint::collect::in_world;
-use crate::constraint::facing::Facing;
+use crate::constraint::facing::{Facing, Reach};
 use crate::constraint::{Contact, FeaturePair, contact_jacobian};
 use crate::spatial::Vector6;
 
@@ -35,14 +35,12 @@ pub(super) fn face(
 ) -> Option<Contact> {
     let (mesh, pose) = at.obstacle(usize::from(features.obstacle));
     let placement = Placement::of(&at.pose, pose);
-    let facing = Facing {
-        body: &at.world.body.mesh,
-        obstacle: mesh,
-        placement: &placement,
-        obstacle_index: features.obstacle,
-        activation_distance: f64::INFINITY,
+    let reach = Reach {
         past_reentrant_edges,
+        ..Reach::new(f64::INFINITY)
     };
+    let (body, index) = (&at.world.body.mesh, features.obstacle);
+    let facing = Facing::new(body, mesh, &placement, index, reach);
     work.feature_pairs += 1;
     facing
         .features(features)

@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::geometry::MassProperties;
+use super::mass::MassProperties;
 
 /// A normal may be this far from unit length: some roundings.
 const UNIT_TOLERANCE: f64 = 1e-9;
@@ -67,7 +67,7 @@ pub enum PrimitiveError {
 
 /// The nearest point of a primitive's surface to a point, and what lies between.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nearest {
+pub struct NearestOnPrimitive {
     /// Unit normal of the surface there, out of the solid.
     pub normal: Vector3<f64>,
     /// Distance along it, m; negative inside.
@@ -110,7 +110,7 @@ impl Primitive {
     }
 
     /// The nearest point of the surface to `p`, as normal and distance. On an axis of symmetry any normal that is right.
-    pub fn nearest(&self, p: &Point3<f64>) -> Nearest {
+    pub fn nearest(&self, p: &Point3<f64>) -> NearestOnPrimitive {
         match self {
             Self::Sphere { center, radius } => around(&(p - center), *radius, &Vector3::z()),
             Self::Capsule { ends, radius } => {
@@ -123,7 +123,7 @@ impl Primitive {
                 )
             }
             Self::Cylinder { ends, radius } => nearest_on_cylinder(p, ends, *radius),
-            Self::Plane { normal, point } => Nearest {
+            Self::Plane { normal, point } => NearestOnPrimitive {
                 normal: *normal,
                 distance: normal.dot(&(p - point)),
             },
@@ -213,9 +213,9 @@ fn about_axis(axis: &Vector3<f64>, along: f64, across: f64) -> Matrix3<f64> {
 }
 
 /// The surface at `radius` around a centre from which `difference` leads to the point.
-fn around(difference: &Vector3<f64>, radius: f64, otherwise: &Vector3<f64>) -> Nearest {
+fn around(difference: &Vector3<f64>, radius: f64, otherwise: &Vector3<f64>) -> NearestOnPrimitive {
     let length = difference.norm();
-    Nearest {
+    NearestOnPrimitive {
         normal: if length > 0.0 {
             difference / length
         } else {
@@ -225,7 +225,11 @@ fn around(difference: &Vector3<f64>, radius: f64, otherwise: &Vector3<f64>) -> N
     }
 }
 
-fn nearest_on_cylinder(p: &Point3<f64>, ends: &[Point3<f64>; 2], radius: f64) -> Nearest {
+fn nearest_on_cylinder(
+    p: &Point3<f64>,
+    ends: &[Point3<f64>; 2],
+    radius: f64,
+) -> NearestOnPrimitive {
     let axis = unit_axis(ends);
     let length = (ends[1] - ends[0]).norm();
     let along = axis.dot(&(p - ends[0]));
@@ -245,18 +249,18 @@ fn nearest_on_cylinder(p: &Point3<f64>, ends: &[Point3<f64>; 2], radius: f64) ->
     let outside = distance - radius;
     if above > 0.0 && outside > 0.0 {
         let gap = above.hypot(outside);
-        return Nearest {
+        return NearestOnPrimitive {
             normal: (cap * above + radial * outside) / gap,
             distance: gap,
         };
     }
     if above > outside {
-        Nearest {
+        NearestOnPrimitive {
             normal: cap,
             distance: above,
         }
     } else {
-        Nearest {
+        NearestOnPrimitive {
             normal: radial,
             distance: outside,
         }

@@ -1,64 +1,15 @@
-//! Shapes: exact primitives beside meshes, on either side.
-//!
-//! A [`Body`] or an [`Obstacle`] with a [`Primitive`] has exactly that form; its mesh, a tessellation within it, is for drawing and for
-//! independent checks. Impacts are searched by [`collision`](crate::collision), whatever the shapes; contacts of two meshes are collected by
-//! [`constraint`](crate::constraint), all others here. Spheres, capsules and cylinders have no facets: normals are exact, and sliding round them is smooth.
-
-mod bound;
-mod collect;
-mod cylinder;
-mod cylinder_pair;
-mod element;
-mod implied;
-pub(crate) mod primitive;
-#[cfg(test)]
-mod primitive_tests;
-mod rim;
-mod separation;
-mod touching;
-
-pub use collect::collect;
-pub use primitive::{Nearest, Primitive, PrimitiveError};
-pub(crate) use separation::separation;
+//! The way of an obstacle to a pose, and how far it is free of the body that stands.
 
 use nalgebra::{Point3, Vector3};
 
-use crate::collision::{
-    AdvancementSettings, Collider, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
-};
+use super::impact::{AdvancementSettings, TimeOfImpact};
+use super::motion::Motion;
+use super::time_of_impact::time_of_impact;
+use super::work::Work;
+use super::workspace::CollisionWorkspace;
+use crate::geometry::Primitive;
 use crate::spatial::{Pose, Vector6, advance_pose, at_reference_point, pose_difference};
-use crate::world::{Body, Obstacle, World};
-
-/// Says which primitive of a world cannot be used, by its body's name, and why.
-pub(crate) fn check_primitives(world: &World) -> Result<(), (String, PrimitiveError)> {
-    if let Some(primitive) = &world.body.primitive {
-        let bounded = match primitive {
-            Primitive::Plane { .. } => Err(PrimitiveError::Unbounded),
-            _ => primitive.validate(),
-        };
-        bounded.map_err(|error| ("god-object".to_owned(), error))?;
-    }
-    for obstacle in &world.obstacles {
-        if let Some(primitive) = &obstacle.primitive {
-            primitive
-                .validate()
-                .map_err(|error| (obstacle.name.clone(), error))?;
-        }
-    }
-    Ok(())
-}
-
-/// Bound on how far a body is from an obstacle at least, m, with its reference point at `center`, world, and however it is turned.
-pub(crate) fn distance_at_least(
-    body: &Body,
-    center: &Point3<f64>,
-    obstacle: &Obstacle,
-    obstacle_pose: &Pose,
-) -> f64 {
-    let center = obstacle_pose.inverse_transform_point(center);
-    let radius = Collider::from(body).radius_about(&body.reference_point);
-    Collider::from(obstacle).distance(&center) - radius
-}
+use crate::world::{Body, Obstacle};
 
 /// The way of an obstacle to a pose while the body stands.
 #[derive(Clone, Copy, Debug)]
