@@ -86,15 +86,24 @@ pub struct DeviceInfo {
 }
 
 impl DeviceInfo {
+    /// Of a device that renders whatever it is asked to, in the degrees of freedom that it senses, at 1 kHz.
+    #[must_use]
+    pub fn ideal(name: impl Into<String>, degrees_of_freedom: u8) -> Self {
+        Self {
+            name: name.into(),
+            sensed_degrees_of_freedom: degrees_of_freedom,
+            actuated_degrees_of_freedom: degrees_of_freedom,
+            limits: DeviceLimits::UNLIMITED,
+            rate_hz: 1000.0,
+        }
+    }
+
     /// Of a device that measures a whole pose and renders no force.
     #[must_use]
     pub fn without_force(name: impl Into<String>) -> Self {
         Self {
-            name: name.into(),
-            sensed_degrees_of_freedom: 6,
             actuated_degrees_of_freedom: 0,
-            limits: DeviceLimits::UNLIMITED,
-            rate_hz: 1000.0,
+            ..Self::ideal(name, 6)
         }
     }
 

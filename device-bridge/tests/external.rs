@@ -8,8 +8,8 @@ use assert_no_alloc::assert_no_alloc;
 use nalgebra::{Point3, Vector6};
 use taut_bridge::edge::pass_on;
 use taut_bridge::{
-    BridgeLoop, CommandSource, Device, DeviceFault, DeviceInfo, DeviceLimits, DevicePort,
-    DeviceSample, Passivity, PassivitySettings, Pose, SafetySettings,
+    BridgeLoop, CommandSource, Device, DeviceFault, DeviceInfo, DevicePort, DeviceSample,
+    Passivity, PassivitySettings, Pose, SafetySettings,
 };
 use taut_link::proto::force::{FORCE_IN_BODY, FORCE_NONE};
 use taut_link::proto::wrench::WRENCH_PAUSED;
@@ -78,19 +78,10 @@ struct Far {
 impl Far {
     fn new(hand: Hand, mode: Passivity) -> Self {
         let hand = Arc::new(Mutex::new(hand));
-        let info = DeviceInfo {
-            name: "a hand".to_owned(),
-            sensed_degrees_of_freedom: 6,
-            actuated_degrees_of_freedom: 6,
-            limits: DeviceLimits::UNLIMITED,
-            rate_hz: 1000.0,
-        };
+        let info = DeviceInfo::ideal("a hand", 6);
         let safety = SafetySettings {
             ramp_in: Duration::from_millis(50),
-            passivity: PassivitySettings {
-                mode,
-                ..PassivitySettings::default()
-            },
+            passivity: PassivitySettings::of(mode),
             ..SafetySettings::default()
         };
         let device = Box::new(Shared(hand.clone(), info));

@@ -19,10 +19,7 @@ use taut_link::proto::{ConstraintSet, EdgeCoupling, InputSample, PoseF64};
 /// Two seconds of ticks, with a silence in the middle, damping on, and events on the way.
 fn drive(device: impl Device + 'static, before_tick: &mut dyn FnMut(u64)) {
     let settings = SafetySettings {
-        passivity: PassivitySettings {
-            mode: Passivity::Control,
-            ..PassivitySettings::default()
-        },
+        passivity: PassivitySettings::of(Passivity::Control),
         ..SafetySettings::default()
     };
     let start = Pose::identity();

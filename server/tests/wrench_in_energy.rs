@@ -9,8 +9,7 @@ use god_object::spatial::Vector6;
 use god_object::{GodObject, Pose};
 use taut::loops::wiring::WiredLoops;
 use taut_bridge::{
-    Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Passivity, PassivitySettings,
-    SafetySettings,
+    Device, DeviceFault, DeviceInfo, DeviceSample, Passivity, PassivitySettings, SafetySettings,
 };
 use taut_bridge::{
     ExternalWrench, ExternalWrenchSettings, NewestWrench, SentWrench, WrenchAxes, WrenchReader,
@@ -61,13 +60,7 @@ impl Device for Shared {
 }
 
 fn free_info() -> DeviceInfo {
-    DeviceInfo {
-        name: "a free hand".to_owned(),
-        sensed_degrees_of_freedom: 6,
-        actuated_degrees_of_freedom: 6,
-        limits: DeviceLimits::UNLIMITED,
-        rate_hz: 1000.0,
-    }
+    DeviceInfo::ideal("a free hand", 6)
 }
 
 /// The loops with a free hand and a source that `force` says, from time, s, and velocity, m/s; what the hand was given at most, J, and its largest force, N.
@@ -87,10 +80,7 @@ fn pumped(mode: Passivity, force: impl Fn(f64, f64) -> f64) -> (f64, f64) {
         most_given: 0.0,
     }));
     let safety = SafetySettings {
-        passivity: PassivitySettings {
-            mode,
-            ..PassivitySettings::default()
-        },
+        passivity: PassivitySettings::of(mode),
         ..SafetySettings::default()
     };
     let (mut input, output) = triple_buffer::triple_buffer(&NewestWrench::default());

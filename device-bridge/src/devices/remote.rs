@@ -73,11 +73,8 @@ impl RemoteDevice {
         let (commands, to_send) = triple_buffer::TripleBuffer::new(&NO_FORCE).split();
         let device = Self {
             info: DeviceInfo {
-                name: "remote".to_owned(),
-                sensed_degrees_of_freedom: 6,
-                actuated_degrees_of_freedom: 6,
                 limits,
-                rate_hz: 1000.0,
+                ..DeviceInfo::ideal("remote", 6)
             },
             inputs,
             commands,

@@ -47,11 +47,9 @@ impl SimulatedDevice {
         let motors = Motors::default();
         Self {
             info: DeviceInfo {
-                name: "simulated".to_owned(),
-                sensed_degrees_of_freedom: 6,
-                actuated_degrees_of_freedom: 6,
                 limits: limits(&grip, &motors),
                 rate_hz: RATE_HZ,
+                ..DeviceInfo::ideal("simulated", 6)
             },
             grip,
             motors,

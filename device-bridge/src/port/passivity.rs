@@ -81,6 +81,17 @@ impl Default for PassivitySettings {
     }
 }
 
+impl PassivitySettings {
+    /// The usual limits in this mode.
+    #[must_use]
+    pub fn of(mode: Passivity) -> Self {
+        Self {
+            mode,
+            ..Self::default()
+        }
+    }
+}
+
 /// Accounts for the energy and damps. No allocation.
 #[derive(Clone, Debug)]
 pub(super) struct PassivityController {

@@ -185,7 +185,7 @@ mod tests {
     use nalgebra::{Point3, Vector6};
 
     use super::*;
-    use crate::device::{DeviceFault, DeviceLimits, DeviceSample, Pose};
+    use crate::device::{DeviceFault, DeviceSample, Pose};
     use crate::port::{Command, DevicePort, Passivity};
 
     /// A hand of `speed` m/s along x, at a device whose metre is `scale` of the scene.
@@ -220,21 +220,14 @@ mod tests {
     /// Whether the samples are believed, and the force along x, N, that is felt where 10 N give energy without end.
     fn felt(scale: f64, speed: f64) -> (bool, f64) {
         let device = Scaled {
-            info: DeviceInfo {
-                name: "scaled".to_owned(),
-                sensed_degrees_of_freedom: 3,
-                actuated_degrees_of_freedom: 3,
-                limits: DeviceLimits::UNLIMITED,
-                rate_hz: 1000.0,
-            },
+            info: DeviceInfo::ideal("scaled", 3),
             scale,
             speed,
         };
         let settings = SafetySettings {
             passivity: PassivitySettings {
-                mode: Passivity::Control,
                 max_debt: 10.0, // nothing but the damping takes any
-                ..PassivitySettings::default()
+                ..PassivitySettings::of(Passivity::Control)
             },
             ..SafetySettings::default()
         };

@@ -10,7 +10,7 @@ mod damping;
 mod faults;
 
 use super::*;
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Pose};
 
 type Answer = Result<DeviceSample, DeviceFault>;
 
@@ -74,13 +74,7 @@ impl Stage {
         let answer = Arc::new(Mutex::new(Err(DeviceFault::NotStarted)));
         let written = Arc::<Mutex<Vector6<f64>>>::default();
         let puppet = Puppet {
-            info: DeviceInfo {
-                name: "puppet".to_owned(),
-                sensed_degrees_of_freedom: 6,
-                actuated_degrees_of_freedom: 6,
-                limits: DeviceLimits::UNLIMITED,
-                rate_hz: 1000.0,
-            },
+            info: DeviceInfo::ideal("puppet", 6),
             answer: Arc::clone(&answer),
             written: Arc::clone(&written),
         };

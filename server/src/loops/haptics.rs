@@ -356,9 +356,7 @@ mod tests {
     use crate::shared::{device_state, wrench_command};
     use god_object::nalgebra::Point3;
     use god_object::spatial::Vector6;
-    use taut_bridge::{
-        Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, SafetySettings,
-    };
+    use taut_bridge::{Device, DeviceFault, DeviceInfo, DeviceSample, SafetySettings};
     use taut_link::Distribution;
 
     const TENSIONS: Duration = Duration::from_micros(40);
@@ -417,13 +415,7 @@ mod tests {
 
     #[test]
     fn a_cycle_costs_its_tensions_and_every_force_since_the_cycle_before() {
-        let device = Strings(DeviceInfo {
-            name: "strings".to_owned(),
-            sensed_degrees_of_freedom: 6,
-            actuated_degrees_of_freedom: 6,
-            limits: DeviceLimits::UNLIMITED,
-            rate_hz: 1000.0,
-        });
+        let device = Strings(DeviceInfo::ideal("strings", 6));
         let start = Pose::identity();
         let (mut commands, readers) = wrench_command::channel();
         let (states, _state_readers) = device_state::channel(&start);

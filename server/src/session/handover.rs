@@ -228,8 +228,6 @@ impl Device for KeptDevice {
 
 #[cfg(test)]
 mod tests {
-    use taut_bridge::DeviceLimits;
-
     use super::*;
 
     /// Ages of its samples and the longest time that it was told, ms.
@@ -274,10 +272,7 @@ mod tests {
     fn the_clock_of_a_kept_device_never_runs_back() {
         let newest = Arc::<AtomicU64>::default();
         let told = Told {
-            info: DeviceInfo {
-                limits: DeviceLimits::UNLIMITED,
-                ..DeviceInfo::without_force("told")
-            },
+            info: DeviceInfo::without_force("told"),
             newest: newest.clone(),
         };
         let mut device: Box<dyn Device> = Box::new(told);

@@ -429,10 +429,7 @@ impl Bridge {
         let device =
             SimulatedDevice::new(Grip::workbench(), Hand::LIGHT, rubbing.path.clone(), point);
         let safety = SafetySettings {
-            passivity: PassivitySettings {
-                mode: passivity,
-                ..PassivitySettings::default()
-            },
+            passivity: PassivitySettings::of(passivity),
             ..SafetySettings::default()
         };
         let port = DevicePort::new(Box::new(device), safety, point, &scene.start);

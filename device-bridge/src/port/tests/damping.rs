@@ -10,9 +10,8 @@ fn damping_keeps_its_cap_where_the_device_measures_less_often() {
         let settings = SafetySettings {
             period: TICK / ticks,
             passivity: PassivitySettings {
-                mode: Passivity::Control,
                 max_debt: 10.0, // nothing but the damping takes any
-                ..PassivitySettings::default()
+                ..PassivitySettings::of(Passivity::Control)
             },
             ..SafetySettings::default()
         };
@@ -67,20 +66,11 @@ impl Device for Weak {
 #[test]
 fn a_moving_obstacle_is_granted_what_its_force_gave_at_the_device() {
     let device = Weak {
-        info: DeviceInfo {
-            name: "weak".to_owned(),
-            sensed_degrees_of_freedom: 6,
-            actuated_degrees_of_freedom: 6,
-            limits: DeviceLimits::UNLIMITED,
-            rate_hz: 1000.0,
-        },
+        info: DeviceInfo::ideal("weak", 6),
         rendered: Vector6::zeros(),
     };
     let settings = SafetySettings {
-        passivity: PassivitySettings {
-            mode: Passivity::Control,
-            ..PassivitySettings::default()
-        },
+        passivity: PassivitySettings::of(Passivity::Control),
         ..SafetySettings::default()
     };
     let start = Pose::identity();

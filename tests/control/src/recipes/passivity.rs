@@ -29,10 +29,7 @@ fn kick(stiffness: f64, mode: Passivity) -> Seen {
     let device = SimulatedDevice::new(grip(DAMPING), Hand::RELEASED, path, Point3::origin());
     let settings = SafetySettings {
         ramp_in: std::time::Duration::ZERO,
-        passivity: PassivitySettings {
-            mode,
-            ..PassivitySettings::default()
-        },
+        passivity: PassivitySettings::of(mode),
         ..SafetySettings::default()
     };
     let start = Pose::identity();

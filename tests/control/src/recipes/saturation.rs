@@ -6,8 +6,7 @@ use std::time::Duration;
 use god_object::{Pose, Vector6};
 use nalgebra::{Point3, Vector3};
 use taut_bridge::{
-    Command, Device, DeviceFault, DeviceInfo, DeviceLimits, DevicePort, DeviceSample, EventKind,
-    SafetySettings,
+    Command, Device, DeviceFault, DeviceInfo, DevicePort, DeviceSample, EventKind, SafetySettings,
 };
 
 use crate::Row;
@@ -54,13 +53,7 @@ impl Device for Moving {
 
 fn port(speed: f64) -> DevicePort {
     let device = Moving {
-        info: DeviceInfo {
-            name: "moving".to_owned(),
-            sensed_degrees_of_freedom: 6,
-            actuated_degrees_of_freedom: 6,
-            limits: DeviceLimits::UNLIMITED,
-            rate_hz: 1000.0,
-        },
+        info: DeviceInfo::ideal("moving", 6),
         speed,
     };
     let start = Pose::translation(0.0, 0.0, device.height(0.0));
