@@ -210,11 +210,10 @@ fn assert_wrong_key(answer: &ControlMessage, what: &str) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_proof_counts_on_its_own_connection_and_for_its_own_claim_only() {
-    let server = server_with(ServerOptions {
-        limits: patient(),
-        idle_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
-    })
+    let server = server_with(limiting(JoinLimits {
+        free_failures: u8::MAX - 1, // these attempts come from one address
+        ..JoinLimits::default()
+    }))
     .await;
     let secret = key('a').join_secret(claim().role, claim().node, claim().grant);
     let open = || connection(server.quic_addr(), server.pin());
@@ -264,14 +263,14 @@ async fn a_proof_counts_on_its_own_connection_and_for_its_own_claim_only() {
     }
 }
 
-/// Holds no client back: these tests come from one address.
-fn patient() -> FloodLimits {
-    FloodLimits {
-        joins: JoinLimits {
-            free_failures: u8::MAX - 1,
-            ..JoinLimits::default()
+/// With other limits of joining.
+fn limiting(joins: JoinLimits) -> ServerOptions {
+    ServerOptions {
+        limits: FloodLimits {
+            joins,
+            ..FloodLimits::default()
         },
-        ..FloodLimits::default()
+        ..forgiving()
     }
 }
 
@@ -319,20 +318,13 @@ async fn guesses_are_slowed_down_and_who_holds_the_key_gets_in_all_the_same() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn many_attempts_at_once_must_prove_their_address_and_are_bounded() {
-    let server = server_with(ServerOptions {
-        limits: FloodLimits {
-            joins: JoinLimits {
-                attempts: Rate {
-                    per_second: 1,
-                    burst: 20,
-                },
-                ..JoinLimits::default()
-            },
-            ..FloodLimits::default()
+    let server = server_with(limiting(JoinLimits {
+        attempts: Rate {
+            per_second: 1,
+            burst: 20,
         },
-        idle_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
-    })
+        ..JoinLimits::default()
+    }))
     .await;
     // Forty who say nothing: each would hold a place for as long as joining may take.
     let silent: Vec<_> = (0..40)
@@ -379,20 +371,13 @@ fn first_packet(server: &ServerLink) -> Vec<u8> {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn first_packets_under_a_node_s_address_do_not_keep_it_out() {
     const PACKETS: u64 = 16;
-    let server = server_with(ServerOptions {
-        limits: FloodLimits {
-            joins: JoinLimits {
-                attempts: Rate {
-                    per_second: 1,
-                    burst: 4,
-                },
-                ..JoinLimits::default()
-            },
-            ..FloodLimits::default()
+    let server = server_with(limiting(JoinLimits {
+        attempts: Rate {
+            per_second: 1,
+            burst: 4,
         },
-        idle_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
-    })
+        ..JoinLimits::default()
+    }))
     .await;
     let forger = must(UdpSocket::bind(SocketAddr::from(([127, 0, 0, 1], 0))));
     for _ in 0..PACKETS {
@@ -415,16 +400,10 @@ async fn first_packets_under_a_node_s_address_do_not_keep_it_out() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn who_is_turned_away_for_long_is_told_so() {
-    let server = server_with(ServerOptions {
-        limits: FloodLimits {
-            joins: JoinLimits {
-                at_once: 0,
-                ..JoinLimits::default()
-            },
-            ..FloodLimits::default()
-        },
-        ..ServerOptions::loopback(key('a'))
-    })
+    let server = server_with(limiting(JoinLimits {
+        at_once: 0,
+        ..JoinLimits::default()
+    }))
     .await;
     let error = error_of(ClientOptions {
         connect_timeout: Duration::from_secs(1),
@@ -448,18 +427,11 @@ async fn forged_datagrams_of_an_unknown_source_are_opened_at_its_rate_only() {
             unknown_source: of_one,
             ..FloodLimits::default()
         },
-        idle_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
+        ..forgiving()
     })
     .await;
     let device = client(&server, Role::Device, "bridge").await;
-    wait_until("its path", || {
-        server
-            .clients()
-            .iter()
-            .all(|client| client.udp_address.is_some())
-    })
-    .await;
+    all_have_paths(&server).await;
     let header = Header {
         version: PROTOCOL_VERSION,
         kind: Kind::Input,
@@ -482,14 +454,7 @@ async fn forged_datagrams_of_an_unknown_source_are_opened_at_its_rate_only() {
         counters.forged + counters.flooded >= 200
     })
     .await;
-    // One that the full buffer of the socket did not take is followed by the next, as a device's are.
-    let mut index = 0;
-    wait_until("a reading of the device", || {
-        index += 1;
-        device.send_input(&input(index));
-        server.counters().inputs > 0
-    })
-    .await;
+    a_reading_arrives(&device, &server).await;
     let most = 8.0 + start.elapsed().as_secs_f64() + 1.0;
     let opened = server.counters().forged as f64;
     assert!(opened >= 1.0 && opened <= most, "{opened} of {most}");

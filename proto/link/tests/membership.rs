@@ -34,9 +34,7 @@ impl Mortal {
         let options = ServerOptions {
             quic,
             udp,
-            idle_timeout: FORGIVING,
-            node_timeout: FORGIVING,
-            ..ServerOptions::loopback(key('a'))
+            ..forgiving()
         };
         let link = must(runtime.block_on(serve(options, content)));
         let addresses = (link.quic_addr(), link.udp_addr());
@@ -361,12 +359,7 @@ fn heavy_content(triangles: u32) -> (Content, u64) {
 async fn a_late_node_gets_a_large_mesh_at_a_pace_that_leaves_the_others_their_states() {
     let (content, bytes) = heavy_content(280_000);
     assert!(bytes > 10_000_000);
-    let options = ServerOptions {
-        idle_timeout: FORGIVING,
-        node_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
-    };
-    let server = must(serve(options, content).await);
+    let server = must(serve(forgiving(), content).await);
     let early = client(&server, Role::Render, "left").await;
     let mut seen = Vec::new();
     let tick = broadcast_until(&mut server.broadcaster(), 1, || {

@@ -3,27 +3,24 @@
 use crate::support::*;
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
-use taut_link::{ClientOptions, Role, ServerOptions, connect};
+use taut_link::{Role, ServerLink, ServerOptions};
+
+/// A socket that clients take for the hot plane of a server, and that server.
+async fn behind_a_door() -> (UdpSocket, ServerLink) {
+    let door = must(UdpSocket::bind("127.0.0.1:0"));
+    must(door.set_read_timeout(Some(Duration::from_millis(2))));
+    let options = ServerOptions {
+        announced_udp_port: Some(must(door.local_addr()).port()),
+        ..forgiving()
+    };
+    (door, server_with(options).await)
+}
 
 /// Holds what a client sends, sends it on from elsewhere, and looks what comes there.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_datagram_that_is_sent_on_from_elsewhere_turns_no_stream_there() {
-    let door = UdpSocket::bind("127.0.0.1:0").expect("a port");
-    door.set_read_timeout(Some(Duration::from_millis(2)))
-        .expect("set");
-    let server = server_with(ServerOptions {
-        announced_udp_port: Some(door.local_addr().expect("bound").port()),
-        idle_timeout: FORGIVING,
-        node_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
-    })
-    .await;
-    let client = must(
-        connect(ClientOptions {
-            ..options(&server, Role::Render, "left")
-        })
-        .await,
-    );
+    let (door, server) = behind_a_door().await;
+    let client = client(&server, Role::Render, "left").await;
     let own = UdpSocket::bind("127.0.0.1:0").expect("a port");
     let elsewhere = UdpSocket::bind("127.0.0.2:0").expect("another address of this machine");
     for socket in [&own, &elsewhere] {
@@ -83,16 +80,7 @@ async fn a_datagram_that_is_sent_on_from_elsewhere_turns_no_stream_there() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_client_whose_address_changes_is_followed_as_soon_as_it_has_answered() {
-    let door = UdpSocket::bind("127.0.0.1:0").expect("a port");
-    door.set_read_timeout(Some(Duration::from_millis(2)))
-        .expect("set");
-    let server = server_with(ServerOptions {
-        announced_udp_port: Some(door.local_addr().expect("bound").port()),
-        idle_timeout: FORGIVING,
-        node_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
-    })
-    .await;
+    let (door, server) = behind_a_door().await;
     let client = client(&server, Role::Render, "left").await;
     // A router that hands out another port in the middle of it.
     let ports = [

@@ -186,9 +186,7 @@ async fn a_node_timeout_that_is_none_is_refused_at_the_start() {
 async fn a_full_server_says_so() {
     let server = server_with(ServerOptions {
         max_clients: 1,
-        idle_timeout: FORGIVING,
-        node_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
+        ..forgiving()
     })
     .await;
     // The workbench's own node has its place; another one finds none.
@@ -211,8 +209,7 @@ async fn a_full_server_says_so() {
 async fn a_house_full_of_observers_has_room_for_device_tracker_operator_and_named_nodes() {
     let server = server_with(ServerOptions {
         max_clients: 8,
-        idle_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
+        ..forgiving()
     })
     .await;
     let mut inside = Vec::new();
@@ -326,10 +323,9 @@ async fn a_port_in_use_is_named() {
             udp,
             ..ServerOptions::loopback(key('a'))
         };
-        match serve(options, content()).await {
-            Err(LinkError::PortInUse { address, .. }) => assert_eq!(address, busy),
-            Err(other) => panic!("{other}"),
-            Ok(_) => panic!("two servers on one port"),
+        match not_served(options, content()).await {
+            LinkError::PortInUse { address, .. } => assert_eq!(address, busy),
+            other => panic!("{other}"),
         }
     }
 }

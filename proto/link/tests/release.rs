@@ -40,9 +40,7 @@ async fn a_server_of_n_to_n_plus_1_and_a_client_of_n_plus_1_to_n_plus_2_speak_n_
     let server = server_with(ServerOptions {
         versions: range(PROTOCOL_VERSION, NEXT),
         announced_udp_port: Some(port.address().port()),
-        idle_timeout: FORGIVING,
-        node_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
+        ..forgiving()
     })
     .await;
     let relay = start_relay(port, server.udp_addr(), Impairment::default(), 1);
@@ -101,10 +99,9 @@ async fn without_a_common_version_both_ends_name_both() {
         versions: range(NEXT, NEXT + 1),
         ..options(&server, Role::Render, "left")
     };
-    let error = match connect(newer).await {
-        Err(error @ LinkError::WrongVersion { .. }) => error.to_string(),
-        Err(other) => panic!("{other}"),
-        Ok(_) => panic!("let in"),
+    let error = match error_of(newer).await {
+        error @ LinkError::WrongVersion { .. } => error.to_string(),
+        other => panic!("{other}"),
     };
     let own = VersionRange::SUPPORTED.to_string();
     assert!(
@@ -210,13 +207,12 @@ async fn a_server_of_the_release_before_is_named_with_both_versions() {
         "left",
     );
     options.connect_timeout = PATIENCE;
-    match connect(options).await {
-        Err(error @ LinkError::WrongVersion { theirs: 3, .. }) => {
+    match error_of(options).await {
+        error @ LinkError::WrongVersion { theirs: 3, .. } => {
             let text = error.to_string();
             let both = format!("version 3, this program speaks {}", VersionRange::SUPPORTED);
             assert!(text.contains(&both), "{text}");
         }
-        Err(other) => panic!("{other}"),
-        Ok(_) => panic!("let in"),
+        other => panic!("{other}"),
     }
 }

@@ -23,6 +23,11 @@ fn with(server: &ServerLink, role: Role, node: &str, credential: Credential) -> 
     }
 }
 
+/// With the credential of exactly this role and name.
+fn own(server: &ServerLink, role: Role, node: &str, issue: u16) -> ClientOptions {
+    with(server, role, node, credential(role, node, issue))
+}
+
 async fn join(options: ClientOptions) -> ClientLink {
     must(connect(options).await)
 }
@@ -93,7 +98,7 @@ async fn each_role_against_each_act(transport: Transport) {
             let server = server().await;
             let client = join(ClientOptions {
                 transport,
-                ..with(&server, role, name, credential(role, name, 1))
+                ..own(&server, role, name, 1)
             })
             .await;
             if !attempt(&client, act).await {
@@ -258,8 +263,7 @@ async fn a_revoked_credential_and_a_closed_role_stay_outside_and_a_new_issue_com
             roles: vec![Role::Render, Role::Device],
             revoked: vec![revoked("left#1"), revoked("bridge")],
         },
-        idle_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
+        ..forgiving()
     })
     .await;
     for (role, name, code) in [
@@ -267,7 +271,7 @@ async fn a_revoked_credential_and_a_closed_role_stay_outside_and_a_new_issue_com
         (Role::Device, "bridge", RefusalCode::Revoked),
         (Role::Observer, "web", RefusalCode::RoleClosed),
     ] {
-        let options = with(&server, role, name, credential(role, name, 1));
+        let options = own(&server, role, name, 1);
         match error_of(options).await {
             LinkError::Refused {
                 code: found, text, ..
@@ -279,13 +283,7 @@ async fn a_revoked_credential_and_a_closed_role_stay_outside_and_a_new_issue_com
         }
     }
     assert_eq!(server.counters().shut_out, 3);
-    let _second = join(with(
-        &server,
-        Role::Render,
-        "left",
-        credential(Role::Render, "left", 2),
-    ))
-    .await;
+    let _second = join(own(&server, Role::Render, "left", 2)).await;
 }
 
 /// Whoever may choose his name must not keep a screen out, nor push out one that is silent for a moment.
@@ -313,13 +311,7 @@ async fn who_floods_is_cut_to_his_rate_and_the_others_go_on() {
     let server = server().await;
     let flooding = client(&server, Role::Observer, "flooding").await;
     let device = client(&server, Role::Device, "bridge").await;
-    wait_until("both paths", || {
-        server
-            .clients()
-            .iter()
-            .all(|client| client.udp_address.is_some())
-    })
-    .await;
+    all_have_paths(&server).await;
     let mut flood = 0;
     wait_until("being cut", || {
         for _ in 0..200 {
@@ -329,14 +321,7 @@ async fn who_floods_is_cut_to_his_rate_and_the_others_go_on() {
         server.counters().flooded > 0
     })
     .await;
-    // One that the full buffer of the socket did not take is followed by the next, as a device's are.
-    let mut index = 0;
-    wait_until("a reading of the device", || {
-        index += 1;
-        device.send_input(&input(index));
-        server.counters().inputs > 0
-    })
-    .await;
+    a_reading_arrives(&device, &server).await;
     let counters = server.counters();
     assert!(counters.forbidden < flood, "{counters:?}");
     assert_eq!(flooding.is_closed(), None);
@@ -346,20 +331,9 @@ async fn who_floods_is_cut_to_his_rate_and_the_others_go_on() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn who_is_revoked_while_he_is_in_goes_out_and_the_others_stay() {
     let server = server().await;
-    let old = with(
-        &server,
-        Role::Render,
-        "left",
-        credential(Role::Render, "left", 1),
-    );
+    let old = own(&server, Role::Render, "left", 1);
     let left = join(old.clone()).await;
-    let web = join(with(
-        &server,
-        Role::Observer,
-        "web",
-        credential(Role::Observer, "web", 1),
-    ))
-    .await;
+    let web = join(own(&server, Role::Observer, "web", 1)).await;
     let policy = JoinPolicy {
         revoked: vec!["left#1".parse().unwrap_or_else(|error| panic!("{error}"))],
         ..JoinPolicy::default()

@@ -2,7 +2,9 @@
 
 use crate::support::*;
 use std::time::Duration;
-use taut_link::{ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport, serve};
+use taut_link::{
+    ClientOptions, Content, LinkError, LinkEvent, Role, ServerOptions, Transport, serve,
+};
 use taut_proto::{
     ClientStats, Finish, Look, Looks, MeshHash, Panorama, Texture, TextureUse, Textures, Wrap,
     WrenchCommand,
@@ -12,13 +14,7 @@ use taut_proto::{
 
 async fn states_arrive_over(transport: Transport) {
     let server = server().await;
-    let client = must(
-        taut_link::connect(ClientOptions {
-            transport,
-            ..options(&server, Role::Render, "left")
-        })
-        .await,
-    );
+    let client = node_over(transport, &server, "left").await;
 
     assert_eq!(client.description(), &content().description);
     for mesh in content().meshes {
@@ -215,14 +211,13 @@ async fn a_device_pose_that_is_no_pose_never_reaches_the_loop() {
 async fn there_is_one_device_bridge() {
     let server = server().await;
     let _bridge = client(&server, Role::Device, "bridge").await;
-    match taut_link::connect(options(&server, Role::Device, "second")).await {
-        Err(LinkError::Refused {
+    match error_of(options(&server, Role::Device, "second")).await {
+        LinkError::Refused {
             code: RefusalCode::DeviceTaken,
             text,
             ..
-        }) => assert!(text.raw().contains("\"bridge\""), "{text}"),
-        Err(other) => panic!("{other}"),
-        Ok(_) => panic!("two bridges"),
+        } => assert!(text.raw().contains("\"bridge\""), "{text}"),
+        other => panic!("{other}"),
     }
 }
 
@@ -230,13 +225,7 @@ async fn there_is_one_device_bridge() {
 async fn session_time_is_within_its_stated_uncertainty() {
     for transport in [Transport::Udp, Transport::QuicDatagram] {
         let server = server().await;
-        let client = must(
-            taut_link::connect(ClientOptions {
-                transport,
-                ..options(&server, Role::Render, "left")
-            })
-            .await,
-        );
+        let client = node_over(transport, &server, "left").await;
         wait_until("clock lock", || client.session_now().is_some()).await;
         tokio::time::sleep(Duration::from_millis(300)).await;
         for _ in 0..20 {
@@ -325,8 +314,7 @@ async fn a_server_that_has_stopped_has_freed_its_port() {
     for _ in 0..40 {
         let options = ServerOptions {
             quic,
-            idle_timeout: FORGIVING,
-            ..ServerOptions::loopback(key('a'))
+            ..forgiving()
         };
         let server = server_with(options).await;
         quic = server.quic_addr();
@@ -363,15 +351,18 @@ async fn a_host_name_will_do() {
     assert!(taut_link::connect(by_name).await.is_ok());
 }
 
+async fn assert_content_refused(content: Content, names: &str) {
+    match not_served(ServerOptions::loopback(key('a')), content).await {
+        LinkError::Content { reason } => assert!(reason.contains(names), "{reason}"),
+        other => panic!("{other}"),
+    }
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn content_without_its_meshes_is_not_served() {
     let mut content = content();
     content.meshes.pop();
-    match serve(ServerOptions::loopback(key('a')), content).await {
-        Err(LinkError::Content { reason }) => assert!(reason.contains("\"box\""), "{reason}"),
-        Err(other) => panic!("{other}"),
-        Ok(_) => panic!("served without a mesh"),
-    }
+    assert_content_refused(content, "\"box\"").await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -380,11 +371,7 @@ async fn the_light_around_the_scene_comes_by_its_hash_and_is_not_served_without(
     let hash = MeshHash::of(&light.encode());
     let mut content = content();
     content.description.environment = Some(hash);
-    match serve(ServerOptions::loopback(key('a')), content.clone()).await {
-        Err(LinkError::Content { reason }) => assert!(reason.contains("panorama"), "{reason}"),
-        Err(other) => panic!("{other}"),
-        Ok(_) => panic!("served without its light"),
-    }
+    assert_content_refused(content.clone(), "panorama").await;
     content.panorama = Some(light.clone());
     let server = must(serve(ServerOptions::loopback(key('a')), content).await);
     let client = client(&server, Role::Render, "left").await;
@@ -429,11 +416,7 @@ async fn textures_come_by_their_hash_and_no_mesh_is_served_without_its_own() {
     let mesh = must(must(mesh.with_looks(looks)).with_textures(textures));
     content.description.god_object.mesh = MeshHash::of(&must(mesh.encode()));
     content.meshes.push(mesh.clone());
-    match serve(ServerOptions::loopback(key('a')), content.clone()).await {
-        Err(LinkError::Content { reason }) => assert!(reason.contains("texture"), "{reason}"),
-        Err(other) => panic!("{other}"),
-        Ok(_) => panic!("served without its texture"),
-    }
+    assert_content_refused(content.clone(), "texture").await;
     content.textures.push(std::sync::Arc::new(texture.clone()));
     let server = must(serve(ServerOptions::loopback(key('a')), content).await);
     let client = client(&server, Role::Render, "left").await;

@@ -6,8 +6,8 @@ use std::{
     time::{Duration, Instant},
 };
 use taut_link::{
-    Broadcaster, ClientLink, ClientOptions, ClusterKey, Content, LinkError, LinkEvent,
-    ReceivedState, Role, ServerLink, ServerOptions, connect, serve,
+    Broadcaster, ClientLink, ClientOptions, ClientStatus, ClusterKey, Content, LinkError,
+    LinkEvent, ReceivedState, Role, ServerLink, ServerOptions, Transport, connect, serve,
 };
 use taut_proto::{
     HotState, InputSample, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
@@ -94,13 +94,17 @@ pub fn content() -> Content {
     }
 }
 
-pub async fn server() -> ServerLink {
-    let options = ServerOptions {
+/// A server that forgives what a busy test machine does to its clients.
+pub fn forgiving() -> ServerOptions {
+    ServerOptions {
         idle_timeout: FORGIVING,
         node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
-    };
-    server_with(options).await
+    }
+}
+
+pub async fn server() -> ServerLink {
+    server_with(forgiving()).await
 }
 
 pub async fn server_with(options: ServerOptions) -> ServerLink {
@@ -117,7 +121,16 @@ pub fn options(server: &ServerLink, role: Role, node: &str) -> ClientOptions {
 }
 
 pub async fn client(server: &ServerLink, role: Role, node: &str) -> ClientLink {
-    must(taut_link::connect(options(server, role, node)).await)
+    must(connect(options(server, role, node)).await)
+}
+
+/// A render node, with this transport.
+pub async fn node_over(transport: Transport, server: &ServerLink, node: &str) -> ClientLink {
+    let options = ClientOptions {
+        transport,
+        ..options(server, Role::Render, node)
+    };
+    must(connect(options).await)
 }
 
 /// State of `tick`, 1 kHz, whose numbers tell the tick.
@@ -172,9 +185,7 @@ pub async fn behind_relay(impairment: Impairment, seed: u64) -> (ServerLink, Rel
     let port = relay_port();
     let server = server_with(ServerOptions {
         announced_udp_port: Some(port.address().port()),
-        idle_timeout: FORGIVING,
-        node_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
+        ..forgiving()
     })
     .await;
     let relay = start_relay(port, server.udp_addr(), impairment, seed);
@@ -256,6 +267,23 @@ pub async fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
     }
 }
 
+/// Waits until the server knows where every client's datagrams come from.
+pub async fn all_have_paths(server: &ServerLink) {
+    let has_path = |client: &ClientStatus| client.udp_address.is_some();
+    wait_until("their paths", || server.clients().iter().all(has_path)).await;
+}
+
+/// Sends readings until the server has one: what the full buffer of a socket did not take is followed by the next, as a device's are.
+pub async fn a_reading_arrives(device: &ClientLink, server: &ServerLink) {
+    let mut index = 0;
+    wait_until("a reading of the device", || {
+        index += 1;
+        device.send_input(&input(index));
+        server.counters().inputs > 0
+    })
+    .await;
+}
+
 pub fn drain(client: &ClientLink) -> Vec<ReceivedState> {
     let mut states = Vec::new();
     client.drain_states(&mut states);
@@ -294,6 +322,14 @@ pub async fn error_of(options: ClientOptions) -> LinkError {
     match connect(options).await {
         Err(error) => error,
         Ok(_) => panic!("let in"),
+    }
+}
+
+/// Why it is not served.
+pub async fn not_served(options: ServerOptions, content: Content) -> LinkError {
+    match serve(options, content).await {
+        Err(error) => error,
+        Ok(_) => panic!("served"),
     }
 }
 
