@@ -11,10 +11,11 @@ use std::sync::atomic::{AtomicI64, Ordering};
 
 use libloading::Library;
 use taut_bridge::Rearm;
+use tempfile::TempDir;
 
 use crate::support::stage::{
-    BAD_SAMPLES, GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW,
-    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, no_write_jumps, opened,
+    BAD_SAMPLES, FAULTS, GOOD, HANGS, Inside, Stage, UNPLUGGED, a_person_arms, goes_wrong,
+    is_a_whole_hand, no_write_jumps, opened,
 };
 
 pub fn here() -> &'static Path {
@@ -83,40 +84,27 @@ impl Inside for Loaded {
     }
 }
 
-#[test]
-fn a_hand_in_c_is_felt_lost_and_felt_again() {
+/// The stand-in as a whole hand: the folder in which it is, what the test sees of it, and what opens it.
+fn hand() -> (TempDir, Loaded, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let library = stand_in(folder.path(), "hand.c", "HAND");
     let inside = Loaded::of(&library);
-    let choice = format!("plugin:{},side=left,scale=1,firm", library.display());
-    let device = opened(&choice).unwrap_or_else(|error| panic!("{error}"));
-    let info = device.info().clone();
-    assert_eq!(info.name, "stand-in hand");
-    let freedoms = (
-        info.sensed_degrees_of_freedom,
-        info.actuated_degrees_of_freedom,
-    );
-    assert_eq!(freedoms, (6, 6));
-    assert_eq!((info.limits.max_force, info.limits.max_torque), (12.0, 0.5));
-    drop(device);
-    let modes = [
-        (HANGS, "was lost"),
-        (NOT_A_NUMBER, "not finite"),
-        (LONG_QUATERNION, "not finite"),
-        (TOO_HOT, "was lost"),
-        (UNPLUGGED, "was lost"),
-        (NOTHING_NEW, "was lost"),
-        (NOT_CALIBRATED, "was lost"),
-    ];
-    goes_wrong(&choice, &inside, &modes);
+    let choice = format!("plugin:{}", library.display());
+    (folder, inside, choice)
+}
+
+#[test]
+fn a_hand_in_c_is_felt_lost_and_felt_again() {
+    let (_folder, inside, choice) = hand();
+    let choice = format!("{choice},side=left,scale=1,firm");
+    is_a_whole_hand(&choice, "stand-in hand");
+    goes_wrong(&choice, &inside, &FAULTS);
 }
 
 #[test]
 fn a_device_that_hangs_is_left_and_closed_when_it_comes_back() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let library = stand_in(folder.path(), "hand.c", "HAND");
-    let inside = Loaded::of(&library);
-    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    let (_folder, inside, choice) = hand();
+    let mut stage = Stage::new(&choice, Rearm::Automatic);
     stage.until_felt(&inside);
     inside.set("after", -1);
     inside.set("mode", HANGS);
@@ -130,10 +118,8 @@ fn a_device_that_hangs_is_left_and_closed_when_it_comes_back() {
 
 #[test]
 fn a_force_does_not_outlive_the_loop_that_wrote_it() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let library = stand_in(folder.path(), "hand.c", "HAND");
-    let inside = Loaded::of(&library);
-    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    let (_folder, inside, choice) = hand();
+    let mut stage = Stage::new(&choice, Rearm::Automatic);
     stage.until_felt(&inside);
     // Nobody ticks any more; the library is read and written on.
     inside.wait("zero without a write", &|| inside.get("force") == 0);
@@ -142,19 +128,15 @@ fn a_force_does_not_outlive_the_loop_that_wrote_it() {
 
 #[test]
 fn no_write_of_a_plug_in_jumps() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let library = stand_in(folder.path(), "hand.c", "HAND");
-    let inside = Loaded::of(&library);
-    let choice = format!("plugin:{},anchor=workbench", library.display());
+    let (_folder, inside, choice) = hand();
+    let choice = format!("{choice},anchor=workbench");
     no_write_jumps(&choice, &inside, &BAD_SAMPLES);
 }
 
 #[test]
 fn a_hand_that_rests_before_the_first_tick_is_felt_all_the_same() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let library = stand_in(folder.path(), "hand.c", "HAND");
-    let inside = Loaded::of(&library);
-    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    let (_folder, inside, choice) = hand();
+    let mut stage = Stage::new(&choice, Rearm::Automatic);
     // A millisecond of its own in each; it rests after some 250.
     inside.wait("it is read and written", &|| inside.get("writes") > 500);
     stage.until_felt(&inside);
@@ -174,10 +156,8 @@ fn a_device_without_motors_is_read_and_never_written() {
 
 #[test]
 fn a_person_arms_a_plug_in_again() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let library = stand_in(folder.path(), "hand.c", "HAND");
-    let inside = Loaded::of(&library);
-    a_person_arms(&format!("plugin:{}", library.display()), &inside);
+    let (_folder, inside, choice) = hand();
+    a_person_arms(&choice, &inside);
 }
 
 #[test]

@@ -10,8 +10,8 @@ use taut_bridge::{DeviceFault, Rearm};
 use tempfile::TempDir;
 
 use crate::support::stage::{
-    BAD_SAMPLES, GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW,
-    PATIENCE, Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, no_write_jumps, opened,
+    BAD_SAMPLES, FAULTS, GOOD, HANGS, Inside, PATIENCE, Stage, a_person_arms, goes_wrong,
+    is_a_whole_hand, no_write_jumps, opened,
 };
 
 // Of tests/python/hand.py.
@@ -95,32 +95,16 @@ fn written(folder: &Path, text: &str) -> (PathBuf, String) {
 #[test]
 fn a_hand_in_python_is_felt_lost_and_felt_again() {
     let inside = Shared::new();
-    let device = opened(&inside.choice).unwrap_or_else(|error| panic!("{error}"));
-    let info = device.info().clone();
-    assert_eq!(info.name, "hand in Python");
-    let freedoms = (
-        info.sensed_degrees_of_freedom,
-        info.actuated_degrees_of_freedom,
-    );
-    assert_eq!(freedoms, (6, 6));
-    assert_eq!((info.limits.max_force, info.limits.max_torque), (12.0, 0.5));
-    drop(device);
+    is_a_whole_hand(&inside.choice, "hand in Python");
     assert_eq!(inside.get("closes"), 1);
-    let modes = [
-        (HANGS, "was lost"),
-        (NOT_A_NUMBER, "not finite"),
-        (LONG_QUATERNION, "not finite"),
-        (TOO_HOT, "was lost"),
-        (UNPLUGGED, "was lost"),
-        (NOTHING_NEW, "was lost"),
-        (NOT_CALIBRATED, "was lost"),
+    let own = [
         (EXITS, "was lost"),
         (WRONG_SHAPE, "was lost"),
         (UNKNOWN_KEY, "was lost"),
         (WRITES_TO_THE_LINK, "was lost"),
         (WRITE_RAISES, "was lost"),
     ];
-    goes_wrong(&inside.choice, &inside, &modes);
+    goes_wrong(&inside.choice, &inside, &[&FAULTS[..], &own].concat());
 }
 
 #[test]

@@ -22,6 +22,17 @@ pub const UNPLUGGED: i64 = 5;
 pub const NOTHING_NEW: i64 = 6;
 pub const NOT_CALIBRATED: i64 = 7;
 
+/// What every hand goes through in [`goes_wrong`], and what the port calls it.
+pub const FAULTS: [(i64, &str); 7] = [
+    (HANGS, "was lost"),
+    (NOT_A_NUMBER, "not finite"),
+    (LONG_QUATERNION, "not finite"),
+    (TOO_HOT, "was lost"),
+    (UNPLUGGED, "was lost"),
+    (NOTHING_NEW, "was lost"),
+    (NOT_CALIBRATED, "was lost"),
+];
+
 /// Numbers of the stand-in: `mode`, `served`, `force`, `torque`, `after`, `closes`, as in plant.h.
 pub trait Inside {
     fn get(&self, name: &str) -> i64;
@@ -181,6 +192,16 @@ fn went_wrong(stage: &mut Stage, inside: &dyn Inside, mode: i64, named: &str) ->
     println!("{fault}: felt again after {back} ms");
     assert!(inside.get("after") <= 0, "a hang kept a force");
     is_named
+}
+
+/// The stand-in says what it is.
+pub fn is_a_whole_hand(choice: &str, name: &str) {
+    let device = opened(choice).unwrap_or_else(|error| panic!("{error}"));
+    let info = device.info();
+    assert_eq!(info.name, name);
+    assert_eq!(info.sensed_degrees_of_freedom, 6);
+    assert_eq!(info.actuated_degrees_of_freedom, 6);
+    assert_eq!((info.limits.max_force, info.limits.max_torque), (12.0, 0.5));
 }
 
 /// Everything that goes wrong with a device that has been felt, and what the port calls it.
