@@ -175,7 +175,7 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
     });
 
     // A late client learns the scene, and gets each mesh by its hash.
-    std::thread::sleep(Duration::from_secs(2));
+    early.goes_on(0);
     let late = Client::join(
         &runtime,
         Client::options(&workbench, &server, "late", Transport::Udp),
