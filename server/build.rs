@@ -1,5 +1,6 @@
 //! Tells the program what it was built from: commit, whether files differed from it, target. A source archive has no commit, unless the packager
-//! gives one as `TAUT_COMMIT`.
+//! gives one as `TAUT_COMMIT`. A debug build has none either: it would have to follow the repository, and every edit of any test and every commit
+//! would build the package and all that stands on it anew.
 
 use std::process::Command;
 
@@ -7,6 +8,7 @@ fn main() {
     println!("cargo::rerun-if-env-changed=TAUT_COMMIT");
     let commit = match std::env::var("TAUT_COMMIT") {
         Ok(commit) if !commit.trim().is_empty() => commit.trim().to_owned(),
+        _ if std::env::var("PROFILE").as_deref() == Ok("debug") => "debug build".to_owned(),
         _ => of_repository().unwrap_or_else(|| "unknown".to_owned()),
     };
     println!("cargo::rustc-env=TAUT_BUILD_COMMIT={commit}");
