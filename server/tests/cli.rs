@@ -537,7 +537,7 @@ fn an_answer_is_written_beside_its_name_until_it_is_whole() {
         &[
             "replay",
             "--scene",
-            "sphere-on-plane",
+            "moving-plate",
             "--trace",
             &trace,
             "--out",

@@ -208,7 +208,7 @@ mod tests {
             "method,rate_hz,cases,within,line,missed\nours,1000,3,2,step,1\npenalty,1000,3,0,step,3\npenalty,1000,3,0,torque,2\npenalty,1000,3,0,penetration,1\n"
         );
         let svg = read("reasons.svg");
-        for name in ["other", "step", "ours", "penalty", "1000 Hz"] {
+        for name in ["other", "jumps", "ours", "penalty", "1000 Hz"] {
             assert!(svg.contains(name), "{name}");
         }
     }
