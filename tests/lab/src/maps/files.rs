@@ -20,9 +20,7 @@ pub(crate) const COLOURS: [(RGBColor, &str); 3] = [
 /// N/m.
 const STIFFNESS: [f64; 2] = [10.0, 200_000.0];
 const COLUMNS: usize = 2;
-const HEAD: u32 = 100;
-/// Methods in a line of the legend.
-const LEGEND: usize = 5;
+const HEAD: u32 = 78;
 const RADIUS: i32 = 4;
 
 /// `stability-methods.csv`.
@@ -75,17 +73,17 @@ pub fn write(points: &[Point], directory: &Path) -> Result<(), Box<dyn Error>> {
     let (head, grid) = root.split_vertically(HEAD);
     let title = "Stiffest contact that is stable: each method (points) beside theory (lines)";
     head.draw(&Text::new(title, (20, 8), ("sans-serif", 17)))?;
-    for (index, method) in METHODS.into_iter().enumerate() {
-        let x = 24 + 170 * (index % LEGEND) as i32;
-        let y = 35 + 20 * (index / LEGEND) as i32;
-        head.draw(&Circle::new((x, y + 7), RADIUS, colour(method).filled()))?;
-        head.draw(&Text::new(method.name(), (x + 9, y), ("sans-serif", 14)))?;
+    let mut x = 24;
+    for method in METHODS {
+        head.draw(&Circle::new((x, 42), RADIUS, colour(method).filled()))?;
+        head.draw(&Text::new(method.name(), (x + 9, 35), ("sans-serif", 14)))?;
+        x += 148;
     }
     let mut x = 24;
     for (ink, text) in COLOURS {
-        let line = [(x, 86), (x + 22, 86)];
+        let line = [(x, 64), (x + 22, 64)];
         head.draw(&PathElement::new(line, ink.stroke_width(2)))?;
-        head.draw(&Text::new(text, (x + 28, 79), ("sans-serif", 14)))?;
+        head.draw(&Text::new(text, (x + 28, 57), ("sans-serif", 14)))?;
         x += 270;
     }
     for (area, map) in grid

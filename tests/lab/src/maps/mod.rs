@@ -40,15 +40,12 @@ use crate::recipes::Extent;
 use contact::Pressed;
 
 /// Who is mapped: what differs from them by adaptation or look-ahead differs before a contact, not in it.
-pub const METHODS: [Method; 9] = [
+pub const METHODS: [Method; 6] = [
     Method::Ours,
     Method::Paper,
     Method::VirtualCoupling,
     Method::Discrete,
     Method::Penalty,
-    Method::StaticCoupling,
-    Method::LinearisedPenalty,
-    Method::TwoRateLcp,
     Method::Point,
 ];
 /// Updates before the device is let go: the method has settled.
