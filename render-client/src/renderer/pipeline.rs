@@ -31,7 +31,8 @@ pub(crate) enum Layer {
 /// A pipeline of the main pass.
 pub(crate) struct PipelineParts<'a> {
     pub(crate) label: &'a str,
-    pub(crate) source: &'a str,
+    /// Of [`FrameLayout::shaders`].
+    pub(crate) shaders: &'a wgpu::ShaderModule,
     pub(crate) vertex: &'a str,
     pub(crate) fragment: &'a str,
     /// Bindings of its own, beside those of the view.
@@ -128,60 +129,106 @@ impl FrameLayout {
         })
     }
 
-    /// A pipeline of the main pass; `source` follows frame.wgsl.
+    /// Shaders of the main pass; `source` follows frame.wgsl.
+    pub(crate) fn shaders(
+        &self,
+        device: &wgpu::Device,
+        output: Output,
+        label: &str,
+        source: &str,
+    ) -> wgpu::ShaderModule {
+        let source = format!(
+            "const SMOOTH = {};\nconst RADIUS = {OCCLUSION_TEXELS}.0;\n{}\n{}\n{source}",
+            output.samples > 1,
+            include_str!("../../shaders/covering.wgsl"),
+            include_str!("../../shaders/frame.wgsl"),
+        );
+        shader(device, label, source)
+    }
+
+    /// A pipeline of the main pass.
     pub(crate) fn pipeline(
         &self,
         device: &wgpu::Device,
         output: Output,
         parts: &PipelineParts<'_>,
     ) -> wgpu::RenderPipeline {
-        let source = format!(
-            "const SMOOTH = {};\nconst RADIUS = {OCCLUSION_TEXELS}.0;\n{}\n{}\n{}",
-            output.samples > 1,
-            include_str!("../../shaders/covering.wgsl"),
-            include_str!("../../shaders/frame.wgsl"),
-            parts.source
-        );
-        let module = shader(device, parts.label, source);
         let with_own = parts.own.map(|own| self.with(device, own));
-        let opaque = parts.layer != Layer::Translucent;
         let background = parts.layer == Layer::Background;
-        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(parts.label),
+        let recipe = Recipe {
+            label: parts.label,
+            shaders: parts.shaders,
             layout: Some(with_own.as_ref().unwrap_or(&self.pipeline)),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some(parts.vertex),
-                compilation_options: Default::default(),
-                buffers: parts.buffers,
-            },
+            entries: [parts.vertex, parts.fragment],
+            buffers: parts.buffers,
             primitive: wgpu::PrimitiveState {
                 topology: parts.topology,
                 cull_mode: (!background).then_some(wgpu::Face::Back),
                 ..Default::default()
             },
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH,
-                depth_write_enabled: Some(parts.layer == Layer::Opaque),
-                depth_compare: Some(if background {
+            depth: Some((
+                parts.layer == Layer::Opaque,
+                if background {
                     wgpu::CompareFunction::LessEqual
                 } else {
                     wgpu::CompareFunction::Less
-                }),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
+                },
+            )),
+            output,
+            blend: (parts.layer == Layer::Translucent).then_some(wgpu::BlendState::ALPHA_BLENDING),
+        };
+        recipe.pipeline(device)
+    }
+}
+
+/// A pipeline to an output with colours.
+struct Recipe<'a> {
+    label: &'a str,
+    shaders: &'a wgpu::ShaderModule,
+    /// Without one: what the shaders bind.
+    layout: Option<&'a wgpu::PipelineLayout>,
+    /// Of vertex and fragment.
+    entries: [&'a str; 2],
+    buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    primitive: wgpu::PrimitiveState,
+    /// Whether depth is written, and how it is compared.
+    depth: Option<(bool, wgpu::CompareFunction)>,
+    output: Output,
+    blend: Option<wgpu::BlendState>,
+}
+
+impl Recipe<'_> {
+    fn pipeline(self, device: &wgpu::Device) -> wgpu::RenderPipeline {
+        let [vertex, fragment] = self.entries;
+        let depth = |(write, compare)| wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(write),
+            depth_compare: Some(compare),
+            stencil: Default::default(),
+            bias: Default::default(),
+        };
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(self.label),
+            layout: self.layout,
+            vertex: wgpu::VertexState {
+                module: self.shaders,
+                entry_point: Some(vertex),
+                compilation_options: Default::default(),
+                buffers: self.buffers,
+            },
+            primitive: self.primitive,
+            depth_stencil: self.depth.map(depth),
             multisample: wgpu::MultisampleState {
-                count: output.samples,
+                count: self.output.samples,
                 ..Default::default()
             },
             fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some(parts.fragment),
+                module: self.shaders,
+                entry_point: Some(fragment),
                 compilation_options: Default::default(),
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: output.format,
-                    blend: (!opaque).then_some(wgpu::BlendState::ALPHA_BLENDING),
+                    format: self.output.format,
+                    blend: self.blend,
                     write_mask: wgpu::ColorWrites::ALL,
                 })],
             }),
@@ -190,6 +237,9 @@ impl FrameLayout {
         })
     }
 }
+
+/// Entry points of shaders of one pipeline.
+const BOTH: [&str; 2] = ["vertex", "fragment"];
 
 /// A pipeline for what lies over everything that its pass has drawn, one part over the other in their order. It has its own bindings.
 pub(crate) fn over_all(
@@ -200,45 +250,21 @@ pub(crate) fn over_all(
     topology: wgpu::PrimitiveTopology,
     vertices: wgpu::VertexBufferLayout<'_>,
 ) -> wgpu::RenderPipeline {
-    let module = shader(&gpu.device, label, source.to_owned());
-    let descriptor = wgpu::RenderPipelineDescriptor {
-        label: Some(label),
+    let recipe = Recipe {
+        label,
+        shaders: &shader(&gpu.device, label, source.to_owned()),
         layout: None,
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: &[Some(vertices)],
-        },
+        entries: BOTH,
+        buffers: &[Some(vertices)],
         primitive: wgpu::PrimitiveState {
             topology,
             ..Default::default()
         },
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(false),
-            depth_compare: Some(wgpu::CompareFunction::Always),
-            stencil: Default::default(),
-            bias: Default::default(),
-        }),
-        multisample: wgpu::MultisampleState {
-            count: output.samples,
-            ..Default::default()
-        },
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(wgpu::ColorTargetState {
-                format: output.format,
-                blend: Some(wgpu::BlendState::ALPHA_BLENDING),
-                write_mask: wgpu::ColorWrites::ALL,
-            })],
-        }),
-        multiview_mask: None,
-        cache: None,
+        depth: Some((false, wgpu::CompareFunction::Always)),
+        output,
+        blend: Some(wgpu::BlendState::ALPHA_BLENDING),
     };
-    gpu.device.create_render_pipeline(&descriptor)
+    recipe.pipeline(&gpu.device)
 }
 
 /// A pipeline that brings finished pictures to an output of `format`: nothing hides anything. It has its own bindings.
@@ -249,28 +275,18 @@ pub(crate) fn to_output(
     source: &str,
     buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
 ) -> wgpu::RenderPipeline {
-    let module = shader(device, label, source.to_owned());
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(label),
+    let recipe = Recipe {
+        label,
+        shaders: &shader(device, label, source.to_owned()),
         layout: None,
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers,
-        },
+        entries: BOTH,
+        buffers,
         primitive: Default::default(), // both sides: a mesh may be mirrored
-        depth_stencil: None,
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(format.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+        depth: None,
+        output: Output { format, samples: 1 },
+        blend: None,
+    };
+    recipe.pipeline(device)
 }
 
 /// A pass that draws to an output anew, black where nothing is drawn.

@@ -37,9 +37,17 @@ impl Pipelines {
         fades: bool,
         texture: Option<&wgpu::BindGroupLayout>,
     ) -> Self {
+        let shaders = |label, source| layout.shaders(device, output, label, source);
+        let solid = shaders(
+            "mesh",
+            concat!(
+                include_str!("../../shaders/mesh.wgsl"),
+                include_str!("../../shaders/ghost.wgsl")
+            ),
+        );
         let mesh = PipelineParts {
             label: "mesh",
-            source: include_str!("../../shaders/mesh.wgsl"),
+            shaders: &solid,
             vertex: "vertex",
             fragment: if fades { "fading" } else { "fragment" },
             own: None,
@@ -55,16 +63,12 @@ impl Pipelines {
         };
         let ghost = PipelineParts {
             label: "ghost",
-            source: concat!(
-                include_str!("../../shaders/mesh.wgsl"),
-                include_str!("../../shaders/ghost.wgsl")
-            ),
             fragment: "ghost",
             ..translucent
         };
         let background = PipelineParts {
             label: "background",
-            source: include_str!("../../shaders/background.wgsl"),
+            shaders: &shaders("background", include_str!("../../shaders/background.wgsl")),
             fragment: "fragment",
             buffers: &[],
             layer: Layer::Background,
@@ -72,7 +76,7 @@ impl Pipelines {
         };
         let floor = PipelineParts {
             label: "floor",
-            source: include_str!("../../shaders/floor.wgsl"),
+            shaders: &shaders("floor", include_str!("../../shaders/floor.wgsl")),
             topology: wgpu::PrimitiveTopology::TriangleStrip,
             layer: Layer::Opaque,
             ..background
@@ -81,12 +85,16 @@ impl Pipelines {
         let textured = texture.map(|texture| {
             let [vertices, instances] = buffer_layouts();
             let buffers = [vertices, instances, coordinate_layout()];
-            let mesh = PipelineParts {
-                label: "textured",
-                source: concat!(
+            let pictured = shaders(
+                "textured",
+                concat!(
                     include_str!("../../shaders/mesh.wgsl"),
                     include_str!("../../shaders/textured.wgsl")
                 ),
+            );
+            let mesh = PipelineParts {
+                label: "textured",
+                shaders: &pictured,
                 vertex: "pictured",
                 fragment: if fades { "textured_fading" } else { "textured" },
                 own: Some(texture),
