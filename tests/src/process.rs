@@ -90,6 +90,11 @@ impl Process {
         command.envs(log.map(|filter| ("TAUT_LOG", filter)));
         // Nothing is kept from one test for another.
         command.env("XDG_CACHE_HOME", directory.join("cache"));
+        // But what the driver that draws in software has compiled: the same code for everybody.
+        command.env(
+            "MESA_SHADER_CACHE_DIR",
+            std::env::temp_dir().join("taut-tests-shaders"),
+        );
         // Drivers complain aloud where a login session has not set it.
         command.env("XDG_RUNTIME_DIR", directory);
         command
