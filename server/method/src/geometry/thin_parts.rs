@@ -169,18 +169,23 @@ impl Bins {
         for i in items {
             parts[bins.bin_of(i)].add(i, middle);
         }
-        let mut above = [0.0; BINS];
+        // A cut behind an empty bin parts the items as the one before it. Most bins are empty: most sets have few items.
+        let filled = |k: &usize| parts[*k].count > 0;
+        let mut above = [0.0; BINS + 1];
         let mut upper = Part::empty();
         for k in (1..BINS).rev() {
-            upper.join(&parts[k]);
-            above[k] = upper.cost();
+            if filled(&k) {
+                upper.join(&parts[k]);
+                above[k] = upper.cost();
+            } else {
+                above[k] = above[k + 1];
+            }
         }
         let mut lower = Part::empty();
-        for cut in 1..BINS {
-            lower.join(&parts[cut - 1]);
-            let cost = lower.cost() + above[cut];
-            let parted = lower.count > 0 && lower.count < items.len();
-            if parted && cost < bins.cost {
+        for last in (0..BINS - 1).filter(filled) {
+            lower.join(&parts[last]);
+            let (cost, cut) = (lower.cost() + above[last + 1], last + 1);
+            if lower.count < items.len() && cost < bins.cost {
                 (bins.cost, bins.cut) = (cost, cut);
             }
         }
