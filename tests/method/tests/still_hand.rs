@@ -4,13 +4,14 @@
 //! `cargo test -p taut-method-tests still_hand -- --ignored --nocapture` takes many more poses, some seven minutes.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use god_object::collision::shapes_intersect;
-use god_object::{Pose, Vector6};
+use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use taut_method_tests::hand::Random;
 use taut_method_tests::motion::Led;
-use taut_scene::{BuiltScene, Scene};
+use taut_scene::{BuiltScene, Prepared, Scene};
 
 /// When the hand has arrived, s.
 const ARRIVED: f64 = 0.4;
@@ -84,22 +85,35 @@ const PEGS: [(&str, f64); 6] = [
     ),
 ];
 
-/// Every obstacle with every surface that it can have.
-fn obstacles() -> impl Iterator<Item = (&'static str, &'static str)> {
-    let with = |surfaces: &'static [&'static str]| {
-        move |obstacle| surfaces.iter().map(move |surface| (obstacle, *surface))
-    };
-    let exact = EXACT.into_iter().flat_map(with(&["", FRICTION]));
-    exact.chain(MESHES.into_iter().flat_map(with(&["", FRICTION, SHADING])))
+/// Every body on every obstacle with every surface that this can have. Meshes that were in the scene before are taken over.
+fn each_scene(mut run: impl FnMut(&Arc<World>, &Settings, &str)) {
+    let exact = EXACT.map(|obstacle| (obstacle, &["", FRICTION][..]));
+    let meshes = MESHES.map(|obstacle| (obstacle, &["", FRICTION, SHADING][..]));
+    let mut before = None;
+    for (obstacle, surfaces) in exact.into_iter().chain(meshes) {
+        for body in BODIES {
+            for surface in surfaces {
+                let built = scene_from(body, obstacle, surface, before.as_ref());
+                let world = Arc::new(built.world);
+                let name = format!("{body} on {obstacle} {surface}");
+                run(&world, &built.settings, &name);
+                before = Some(Prepared::new(world, built.sources));
+            }
+        }
+    }
 }
 
 fn scene(body: &str, obstacle: &str, surface: &str) -> BuiltScene {
+    scene_from(body, obstacle, surface, None)
+}
+
+fn scene_from(body: &str, obstacle: &str, surface: &str, before: Option<&Prepared>) -> BuiltScene {
     let text = format!(
         "name = \"still\"\n[god_object]\nshape = {{ {body} }}\nmass = 1.0\npose = {{ position = [0.0, 0.0, 0.2] }}\n\
          [[obstacle]]\nname = \"obstacle\"\nshape = {{ {obstacle} }}\n{surface}\n"
     );
     Scene::parse("still.toml", &text, Path::new("."))
-        .and_then(|scene| scene.build())
+        .and_then(|scene| scene.build_from(before))
         .unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
@@ -123,12 +137,12 @@ fn between(a: &Pose, b: &Pose, share: f64) -> Pose {
 }
 
 /// Where the hand comes from and where it stays: [`DEPTH`] beyond the first touch from above, at a random place and orientation.
-fn landing(built: &BuiltScene, random: &mut Random) -> [Pose; 2] {
+fn landing(world: &World, random: &mut Random) -> [Pose; 2] {
     let rotation = random.rotation();
     let [x, y] = [(); 2].map(|()| 0.012 * (2.0 * random.unit() - 1.0));
     let at = |z: f64| Pose::from_parts(Vector3::new(x, y, z).into(), rotation);
-    let obstacle = &built.world.obstacles[0];
-    let meet = |z: f64| shapes_intersect(&built.world.body, &at(z), obstacle, &obstacle.pose);
+    let obstacle = &world.obstacles[0];
+    let meet = |z: f64| shapes_intersect(&world.body, &at(z), obstacle, &obstacle.pose);
     let (mut high, mut low) = (0.08, 0.0);
     while high - low > 1e-6 {
         let middle = 0.5 * (high + low);
@@ -150,11 +164,8 @@ fn wedging(random: &mut Random) -> [Pose; 2] {
 }
 
 /// Largest step and largest way of the wrench while the hand stands still, N.
-fn unrest(built: &BuiltScene, [from, to]: &[Pose; 2]) -> f64 {
-    let mut led = Led::new(&BuiltScene {
-        start: *from,
-        ..built.clone()
-    });
+fn unrest(world: &Arc<World>, settings: &Settings, [from, to]: &[Pose; 2]) -> f64 {
+    let mut led = Led::in_world(world.clone(), settings, *from);
     let (mut first, mut last): (Option<Vector6>, Option<Vector6>) = (None, None);
     let mut unrest = 0.0_f64;
     for k in 0..=(LOOKED_AT[1] * 1000.0) as u32 {
@@ -201,15 +212,12 @@ impl Unrests {
 
 fn landed(poses: impl Iterator<Item = u64> + Clone) -> Unrests {
     let mut unrests = Unrests::none();
-    for (obstacle, surface) in obstacles() {
-        for body in BODIES {
-            let built = scene(body, obstacle, surface);
-            for seed in poses.clone() {
-                let found = unrest(&built, &landing(&built, &mut Random(seed)));
-                unrests.note(found, format!("{body} on {obstacle} {surface}, {seed}"));
-            }
+    each_scene(|world, settings, name| {
+        for seed in poses.clone() {
+            let way = landing(world, &mut Random(seed));
+            unrests.note(unrest(world, settings, &way), format!("{name}, {seed}"));
         }
-    }
+    });
     unrests
 }
 
@@ -218,8 +226,9 @@ fn wedged(poses: impl Iterator<Item = u64> + Clone) -> Unrests {
     for peg in PEGS {
         for friction in [0.0, 0.2, 0.4] {
             let built = peg_in_hole(peg, friction);
+            let world = Arc::new(built.world);
             for seed in poses.clone() {
-                let found = unrest(&built, &wedging(&mut Random(seed)));
+                let found = unrest(&world, &built.settings, &wedging(&mut Random(seed)));
                 unrests.note(found, format!("{peg:?} {friction}, {seed}"));
             }
         }
@@ -230,48 +239,40 @@ fn wedged(poses: impl Iterator<Item = u64> + Clone) -> Unrests {
 /// Share of the samples, landing and sliding, whose forces differ when all is turned.
 fn turns(poses: impl Iterator<Item = u64> + Clone, share: f64) -> f64 {
     let (mut samples, mut differ, mut worst) = (0_u32, 0_u32, 0.0_f64);
-    for (obstacle, surface) in obstacles() {
-        for body in BODIES {
-            let mut built = scene(body, obstacle, surface);
-            built.settings.k_h *= built.settings.k_s / share;
-            built.settings.k_s = share;
-            for seed in poses.clone() {
-                let mut random = Random(seed);
-                let [from, to] = landing(&built, &mut random);
-                let turn = Pose::from_parts(Vector3::zeros().into(), random.rotation());
-                let mut turned = BuiltScene {
-                    start: turn * from,
-                    ..built.clone()
+    each_scene(|world, settings, _| {
+        let mut settings = *settings;
+        settings.k_h *= settings.k_s / share;
+        settings.k_s = share;
+        for seed in poses.clone() {
+            let mut random = Random(seed);
+            let [from, to] = landing(world, &mut random);
+            let turn = Pose::from_parts(Vector3::zeros().into(), random.rotation());
+            let mut turned = World::clone(world);
+            for obstacle in &mut turned.obstacles {
+                obstacle.pose = turn * obstacle.pose;
+            }
+            let mut led = Led::in_world(world.clone(), &settings, from);
+            let mut led_turned = Led::in_world(Arc::new(turned), &settings, turn * from);
+            let mut across = to;
+            across.translation.vector += Vector3::new(0.01, 0.007, 0.0);
+            for k in 0..800 {
+                let time = f64::from(k) * 1e-3;
+                let device = if time < ARRIVED {
+                    between(&from, &to, time / ARRIVED)
+                } else {
+                    between(&to, &across, (time - ARRIVED) / ARRIVED)
                 };
-                for obstacle in &mut turned.world.obstacles {
-                    obstacle.pose = turn * obstacle.pose;
-                }
-                let mut led = Led::new(&BuiltScene {
-                    start: from,
-                    ..built.clone()
-                });
-                let mut led_turned = Led::new(&turned);
-                let mut across = to;
-                across.translation.vector += Vector3::new(0.01, 0.007, 0.0);
-                for k in 0..800 {
-                    let time = f64::from(k) * 1e-3;
-                    let device = if time < ARRIVED {
-                        between(&from, &to, time / ARRIVED)
-                    } else {
-                        between(&to, &across, (time - ARRIVED) / ARRIVED)
-                    };
-                    let force = led.step(time, &device).wrench;
-                    let other = led_turned.step(time, &(turn * device)).wrench;
-                    let force = force.fixed_rows::<3>(0).into_owned();
-                    let other = turn.rotation.inverse() * other.fixed_rows::<3>(0).into_owned();
-                    let difference = (force - other).norm();
-                    samples += 1;
-                    differ += u32::from(difference > AGREES * force.norm().max(0.5));
-                    worst = worst.max(difference);
-                }
+                let force = led.step(time, &device).wrench;
+                let other = led_turned.step(time, &(turn * device)).wrench;
+                let force = force.fixed_rows::<3>(0).into_owned();
+                let other = turn.rotation.inverse() * other.fixed_rows::<3>(0).into_owned();
+                let difference = (force - other).norm();
+                samples += 1;
+                differ += u32::from(difference > AGREES * force.norm().max(0.5));
+                worst = worst.max(difference);
             }
         }
-    }
+    });
     println!("{differ} of {samples}, worst {worst:e} N");
     f64::from(differ) / f64::from(samples)
 }
@@ -317,7 +318,7 @@ fn shading_changes_nothing_where_every_edge_is_a_crease() {
         let [plain, shaded] = ["", SHADING].map(|surface| scene(body, MESHES[3], surface));
         for seed in 0..6 {
             let mut random = Random(seed);
-            let [mut from, mut to] = landing(&plain, &mut random);
+            let [mut from, mut to] = landing(&plain.world, &mut random);
             let aside = Vector3::new(0.012 + 0.02 * random.unit(), 0.03 * random.unit(), 0.0);
             for pose in [&mut from, &mut to] {
                 pose.translation.vector += aside;
