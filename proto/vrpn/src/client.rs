@@ -14,10 +14,11 @@ use std::net::SocketAddrV4;
 
 use crate::PayloadError;
 use crate::button::{self, ButtonChange, ButtonStates};
-use crate::cookie::{COOKIE_BYTES, CookieError, Version, check, cookie};
+use crate::cookie::{CookieError, Version, cookie};
 use crate::description;
 use crate::force::{self, ForceReport, SurfaceContactReport};
 use crate::message::{Header, Message, MessageError, Stamp, append, first};
+use crate::stream::{Part, receive};
 use crate::tracker::{self, PoseReport, VelocityReport};
 
 /// Most names of senders that are kept for people to read.
@@ -159,23 +160,13 @@ impl Client {
     pub fn receive(&mut self, bytes: &[u8]) -> Result<(), ClientError> {
         let mut inbound = std::mem::take(&mut self.inbound);
         inbound.extend_from_slice(bytes);
-        let mut rest = inbound.as_slice();
-        if !self.is_open {
-            let Some((greeting, after)) = rest.split_first_chunk::<COOKIE_BYTES>() else {
-                self.inbound = inbound;
-                return Ok(());
-            };
-            let version = check(greeting)?;
-            rest = after;
-            self.open(version);
-        }
-        while let Some((message, taken)) = first(rest)? {
-            self.take(&message)?;
-            rest = &rest[taken..];
-        }
-        let taken = inbound.len() - rest.len();
-        inbound.drain(..taken);
-        self.inbound = inbound;
+        self.inbound = receive(inbound, self.is_open, |part| match part {
+            Part::Greeting(version) => {
+                self.open(version);
+                Ok(())
+            }
+            Part::Message(message) => self.take(&message),
+        })?;
         Ok(())
     }
 

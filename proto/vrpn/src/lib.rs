@@ -27,6 +27,7 @@ pub mod force;
 mod mapping;
 pub mod message;
 mod server;
+mod stream;
 pub mod tracker;
 
 pub use address::{Address, AddressError, DEFAULT_PORT};

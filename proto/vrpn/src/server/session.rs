@@ -6,9 +6,9 @@ use super::error::ServerError;
 use super::outbox::Outbox;
 use super::question::{ClientNumbers, Question};
 use super::report::{Report, TYPES};
-use crate::cookie::{COOKIE_BYTES, check};
 use crate::description;
-use crate::message::{Header, Message, Stamp, first};
+use crate::message::{Header, Message, Stamp};
+use crate::stream::{Part, receive};
 use crate::tracker;
 
 /// Sensors of the device: god-object, device, head.
@@ -77,24 +77,14 @@ impl ServerSession {
     pub fn receive(&mut self, bytes: &[u8], now: Stamp) -> Result<(), ServerError> {
         let mut inbound = std::mem::take(&mut self.inbound);
         inbound.extend_from_slice(bytes);
-        let mut rest = inbound.as_slice();
-        if !self.is_open {
-            let Some((greeting, after)) = rest.split_first_chunk::<COOKIE_BYTES>() else {
-                self.inbound = inbound;
-                return Ok(());
-            };
-            check(greeting)?;
-            rest = after;
-            self.is_open = true;
-            self.outbox.introduce(&self.device, &TYPES);
-        }
-        while let Some((message, taken)) = first(rest)? {
-            self.take(&message, now)?;
-            rest = &rest[taken..];
-        }
-        let taken = inbound.len() - rest.len();
-        inbound.drain(..taken);
-        self.inbound = inbound;
+        self.inbound = receive(inbound, self.is_open, |part| match part {
+            Part::Greeting(_) => {
+                self.is_open = true;
+                self.outbox.introduce(&self.device, &TYPES);
+                Ok(())
+            }
+            Part::Message(message) => self.take(&message, now),
+        })?;
         Ok(())
     }
 
