@@ -29,7 +29,7 @@ use tokio::time::{Instant, sleep, timeout};
 use crate::asking::{Asking, Entrance, REQUEST_TIME};
 use crate::http::{End, HTML, JSON_LINES, Lines, PNG, TEXT, answer, body, head, request, send};
 use crate::operator_request::{Call, Deed, Refusal, read};
-use crate::service::{ACCEPT_PAUSE, Service, listen, runtime};
+use crate::service::{Service, accepted, listen, runtime};
 
 /// The page at `/`: self-contained, it reads `/stream`.
 const PAGE: &str = include_str!("operator.html");
@@ -193,10 +193,7 @@ impl OperatorServer {
 
 async fn accept(listener: TcpListener, shared: Shared) {
     loop {
-        let Ok((stream, peer)) = listener.accept().await else {
-            sleep(ACCEPT_PAUSE).await;
-            continue;
-        };
+        let (stream, peer) = accepted(&listener).await;
         let asking = shared.entrance.ask(peer);
         let shared = shared.clone();
         tokio::spawn(async move {

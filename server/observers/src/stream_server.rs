@@ -15,7 +15,7 @@ use futures_util::{SinkExt, StreamExt};
 use tokio::io::AsyncWriteExt;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{broadcast, watch};
-use tokio::time::{sleep, timeout};
+use tokio::time::timeout;
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
@@ -27,7 +27,7 @@ use crate::feed::StateFeed;
 use crate::http::{End, HTML, JSON_LINES, Lines, SEND_TIME, TEXT, answer, head, request, send};
 use crate::lines::{Hello, Naming, missed_line, state_line};
 use crate::request::{Refusal, Wish, read};
-use crate::service::{ACCEPT_PAUSE, Service, listen, runtime};
+use crate::service::{Service, accepted, listen, runtime};
 
 /// The page at `/`: self-contained, it reads `/ws`.
 const PAGE: &str = include_str!("page.html");
@@ -184,10 +184,7 @@ impl Drop for Place {
 
 async fn accept(listener: TcpListener, shared: &Shared) {
     loop {
-        let Ok((stream, peer)) = listener.accept().await else {
-            sleep(ACCEPT_PAUSE).await;
-            continue;
-        };
+        let (stream, peer) = accepted(&listener).await;
         let asking = shared.entrance.ask(peer);
         let shared = shared.clone();
         tokio::spawn(async move {

@@ -18,7 +18,7 @@ use tokio::sync::watch;
 use tokio::time::{Instant, sleep, timeout, timeout_at};
 
 use crate::feed::StateFeed;
-use crate::service::{ACCEPT_PAUSE, Service, dialling_socket, listen, runtime};
+use crate::service::{ACCEPT_PAUSE, Service, accepted, dialling_socket, listen, runtime};
 use crate::vrpn_reports::{VrpnFrame, button_reports};
 
 /// Longest that a client may take to greet, and a call-back to be answered.
@@ -181,15 +181,11 @@ impl Drop for Place {
 
 async fn accept(listener: TcpListener, shared: &Shared) {
     loop {
-        match listener.accept().await {
-            Ok((stream, SocketAddr::V4(peer))) => {
-                // Without a place the connection is closed at once.
-                if let Some(place) = shared.place() {
-                    tokio::spawn(client(stream, *peer.ip(), shared.clone(), place));
-                }
-            }
-            Ok(_) => {}
-            Err(_) => sleep(ACCEPT_PAUSE).await,
+        // Without a place the connection is closed at once.
+        if let (stream, SocketAddr::V4(peer)) = accepted(&listener).await
+            && let Some(place) = shared.place()
+        {
+            tokio::spawn(client(stream, *peer.ip(), shared.clone(), place));
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::str::SplitWhitespace;
 
 use god_object::surface::CornerCoordinates;
 
@@ -32,11 +33,7 @@ pub(super) fn parse(
     // Faces may name vertices that come later: remember the line, check at the end.
     let mut first_line_of_largest = (0u32, 0usize);
     for (number, line) in lines(&text) {
-        let mut words = line
-            .split('#')
-            .next()
-            .unwrap_or_default()
-            .split_whitespace();
+        let mut words = words(&line);
         match words.next() {
             Some("v") => {
                 // Red, green and blue behind the coordinates, as scanners write them.
@@ -173,6 +170,14 @@ pub(super) fn coordinates_of_pictures(bytes: &[u8]) -> Vec<Corners> {
     found.into_iter().map(single).collect()
 }
 
+/// What stands in a line before a comment.
+fn words(line: &str) -> SplitWhitespace<'_> {
+    line.split('#')
+        .next()
+        .unwrap_or_default()
+        .split_whitespace()
+}
+
 /// `stand_in` is for what a corner does not have; without it that is refused.
 fn coordinates(bytes: &[u8], stand_in: Option<[f64; 2]>) -> Result<Vec<CornerCoordinates>, Fault> {
     let text = String::from_utf8_lossy(without_mark(bytes));
@@ -181,11 +186,7 @@ fn coordinates(bytes: &[u8], stand_in: Option<[f64; 2]>) -> Result<Vec<CornerCoo
     // Faces may name vertices and pairs that come later.
     let mut faces: Vec<(usize, Vec<u32>, Vec<u32>)> = Vec::new();
     for (number, line) in lines(&text) {
-        let mut words = line
-            .split('#')
-            .next()
-            .unwrap_or_default()
-            .split_whitespace();
+        let mut words = words(&line);
         match words.next() {
             Some("v") => vertices
                 .push(vertex(vertices.len(), words).map_err(|text| Fault::at(number, text))?),
