@@ -28,13 +28,13 @@ pub(super) fn import_as(
     Ok((report, verdict))
 }
 
-fn apart(a: Point, b: Point) -> f64 {
-    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
-}
-
-fn nearest(cloud: &[Point], place: Point) -> f64 {
-    let all = cloud.iter().map(|p| apart(*p, place));
-    all.fold(f64::INFINITY, f64::min)
+fn nearest(cloud: &[Point], [x, y, z]: Point) -> f64 {
+    let mut least = f64::INFINITY;
+    for p in cloud {
+        let (x, y, z) = (p[0] - x, p[1] - y, p[2] - z);
+        least = least.min(x * x + y * y + z * z);
+    }
+    least.sqrt()
 }
 
 /// A place of the triangle, by two numbers in [0, 1].
