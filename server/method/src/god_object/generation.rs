@@ -21,8 +21,8 @@ const LONGER_WAY: f64 = 0.5;
 /// Share of the motion tolerance by which a row that was left out may be violated. By the whole of it, rows a millimetre apart would let a
 /// body be turned by tens of microradians, and a torque about the axis of a hole of millionths of the force be felt; a row more costs a microsecond.
 const ROW_TOLERANCE_SHARE: f64 = 1e-3;
-/// Motions of a published set whose answers are searched along and turn: where the device is, and where it goes on to.
-const SEARCHED_MOTIONS: usize = 2;
+/// Motions of a published set whose answers turn: where the device is, and where it goes on to.
+const TURNING_MOTIONS: usize = 2;
 /// Most rows that are added one by one where friction or a moving obstacle leads.
 const MAX_ADDED: u32 = 24;
 
@@ -120,7 +120,7 @@ impl GodObject {
         let probes = self.probes(difference, reach);
         // Where every pair is a row, those remain that they turn into.
         let asked = if all == Some(true) {
-            SEARCHED_MOTIONS
+            TURNING_MOTIONS
         } else {
             MAX_MOTIONS
         };
@@ -132,7 +132,7 @@ impl GodObject {
         if met == Some(true) {
             if all != Some(true) {
                 // The rows of the other probes are there, and no corner asks for more of them.
-                self.complete_for_force(&probes[..SEARCHED_MOTIONS], work);
+                self.complete_for_force(&probes[..TURNING_MOTIONS], work);
             }
             self.with_reduction(|this, reduction, at| {
                 reduction.forget_corners((at, &this.surfaces(None)));
@@ -193,8 +193,7 @@ impl GodObject {
     fn complete_for(&mut self, motions: &[Vector6], purpose: Purpose, work: &mut Work) {
         self.with_reduction(|this, reduction, at| {
             let answers = this.answers(reduction, at, motions, purpose, work);
-            let searched = &answers[..answers.len().min(SEARCHED_MOTIONS)];
-            if this.search(reduction, at, searched, purpose, work) {
+            if this.search(reduction, at, &answers, purpose, work) {
                 this.answers(reduction, at, motions, purpose, work);
             }
             if reduction.is_full() {
@@ -215,7 +214,7 @@ impl GodObject {
     ) -> ArrayVec<Vector6, MAX_MOTIONS> {
         let wished = Wished {
             motions,
-            turning: SEARCHED_MOTIONS,
+            turning: TURNING_MOTIONS,
             purpose,
         };
         let projections = reduction.complete((at, &self.surfaces(None)), &wished, work);

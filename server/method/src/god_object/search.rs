@@ -15,8 +15,9 @@ use crate::spatial::Vector6;
 const SEARCH_FACTOR: u64 = 16;
 
 impl GodObject {
-    /// Adds to the candidates those pairs that one of the answers violates, of obstacles whose surface conforms to the body's: nearest first, a
-    /// collection there is given up before it has seen what a motion presses against. Whether there are any.
+    /// Adds to the candidates those pairs that one of the answers violates; whether there are any. For a motion only of obstacles whose surface conforms
+    /// to the body's: nearest first, a collection there is given up before it has seen what the motion presses against, and elsewhere continuous
+    /// collision detection names what is missing. For the force nothing else does.
     pub(super) fn search(
         &mut self,
         reduction: &mut RowReduction,
@@ -49,7 +50,8 @@ impl GodObject {
         };
         let mut any = false;
         for index in 0..at.places.len() {
-            if !at.places[index].chosen || !reduction.conforms(at, index) {
+            let searched = purpose.is_felt() || reduction.conforms(at, index);
+            if !at.places[index].chosen || !searched {
                 continue;
             }
             let asked = Violated {
