@@ -68,7 +68,6 @@ pub(crate) struct Round<'a> {
     pub(crate) candidate: &'a Pose,
     /// The same, as a point.
     center: Point3<f64>,
-    rows: &'a [HalfSpace],
 }
 
 impl<'a> LinearAnswer<'a> {
@@ -85,7 +84,6 @@ impl<'a> LinearAnswer<'a> {
             stuck_at,
             carried,
             reference_point: &round.center,
-            rows: round.rows,
             constraints: self.constraints,
             moved: Some((self.start, round.candidate, self.shaded)),
         }
@@ -195,7 +193,6 @@ impl ImplicitRounds {
                 unconstrained: &unconstrained,
                 candidate: &candidate,
                 center: Point3::from(candidate.translation.vector),
-                rows,
             };
             let projection = with_friction(&round_problem, projector, frictionless);
             if projection.status != ProjectionStatus::Solved {

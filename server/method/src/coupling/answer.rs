@@ -83,9 +83,6 @@ impl Coupling {
             return frictionless;
         };
         let god_object = &self.present.god_object;
-        for (row, bound) in self.rough_rows.iter_mut().zip(&self.bounds) {
-            row.bound = *bound;
-        }
         let k_s = self.settings.k_s;
         let problem = FrictionProblem {
             metric,
@@ -93,7 +90,6 @@ impl Coupling {
             stuck_at: &self.anchor.acceleration(god_object, unconstrained, k_s),
             carried: self.anchor.carried(k_s),
             reference_point: &Point3::from(god_object.translation.vector),
-            rows: &self.rough_rows,
             constraints: &set.constraints,
             moved: None,
         };

@@ -29,7 +29,7 @@ use crate::implicit::ImplicitRounds;
 use crate::known_rows::KnownRows;
 use crate::obstacle_work::ObstacleWork;
 use crate::prepared_rows::{PreparedRows, RowBasis};
-use crate::quasi_statics::{HalfSpace, ProjectionStatus, Projector};
+use crate::quasi_statics::{ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{Pose, Vector6, at_reference_point, pose_is_finite};
 use crate::surface::{EnergyObserver, Friction, ShadedAcceleration, StickAnchor, Textures};
@@ -52,8 +52,6 @@ pub struct Coupling {
     /// `None` when every obstacle is frictionless.
     friction: Option<Friction>,
     anchor: StickAnchor,
-    /// The rows with the bounds in force, where there is friction.
-    rough_rows: Vec<HalfSpace>,
     /// `None` unless passivity is enforced.
     energy: Option<EnergyObserver>,
     /// `None` where nothing is damped.
@@ -89,7 +87,6 @@ impl Coupling {
             own: PreparedRows::with_capacity(capacity),
             present: PresentSet::none(),
             projector: Projector::new(settings.solver, capacity),
-            rough_rows: Vec::with_capacity(if friction.is_some() { capacity } else { 0 }),
             friction,
             anchor: StickAnchor::default(),
             energy: settings.passive.then(EnergyObserver::new),

@@ -113,13 +113,6 @@ impl Coupling {
             self.projector.limit_iterations(most);
             self.implicit.limit_iterations(most);
         }
-        if self.friction.is_some() {
-            let center = Point3::from(prepared.god_object.translation.vector);
-            let rows = set.constraints.iter().take(self.bounds.len());
-            self.rough_rows.clear();
-            self.rough_rows
-                .extend(rows.map(|row| self.basis.half_space(row, &center)));
-        }
 
         // Rows are known by their features. Those that held the body last time are looked for where they are now, unless the publisher has
         // done it, for a device pose of a moment ago.

@@ -67,7 +67,6 @@ impl GodObject {
                 stuck_at: &stuck_at,
                 carried,
                 reference_point: &center,
-                rows: &self.rows,
                 constraints: &self.set.constraints,
                 moved: None,
             };

@@ -59,7 +59,6 @@ impl GodObject {
                 stuck_at: &Vector6::zeros(),
                 carried: Carried::NOT,
                 reference_point: &center,
-                rows: &self.rows,
                 constraints: &held,
                 moved: Some((&start, &reached, false)),
             };

@@ -23,4 +23,5 @@ pub use metric::Metric;
 pub(crate) use projection::MAX_ACTIVE;
 pub use projection::{ActiveRow, Projection, ProjectionStatus, SolverKind};
 pub use projector::{KKT_TOLERANCE, Projector};
+pub(crate) use rows::Rows;
 pub use solve::SolverLimits;

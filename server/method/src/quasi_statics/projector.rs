@@ -15,7 +15,7 @@ use super::half_space::HalfSpace;
 use super::least_distance::{Bounds, LeastDistance};
 use super::metric::Metric;
 use super::projection::{ActiveRow, Projection, ProjectionStatus, SolverKind};
-use super::rows::Prepared;
+use super::rows::{Prepared, Rows};
 use super::solve::{Answer, Outcome, Solve, SolverLimits};
 use crate::spatial::Vector6;
 
@@ -93,6 +93,11 @@ impl Projector {
     pub(crate) fn copy_from(&mut self, source: &Projector) {
         self.problem.copy_from(&source.problem);
         self.active_set.copy_from(&source.active_set);
+    }
+
+    /// The prepared rows.
+    pub(crate) fn rows(&self) -> &Rows {
+        &self.problem.rows
     }
 
     /// Replaces the bound of one prepared row, in the unit that the row was given in. A row out of range is ignored.

@@ -10,6 +10,8 @@
 //! instructions per row. The rows keep the coordinates they were given in: a scan measures the acceleration that is answered,
 //! not its picture in other coordinates.
 
+mod near;
+
 use pulp::{Arch, Simd, WithSimd};
 
 use super::half_space::HalfSpace;

@@ -1,10 +1,9 @@
-//! The cone problem of all touching contacts: full stick where the cones allow it, else Newton's method.
+//! The cone problem of all touching contacts, by Newton's method; full stick, cut to the cones, where that fails.
 //!
 //! Each contact: `0 <= lambda_n  _|_  J_n a - b >= 0`, and its tangential multiplier is the point of the disc of radius
 //! `mu lambda_n` that opposes its slip most (maximal dissipation; exact circles, so no direction is preferred). The rows are
-//! more than the six unknowns, and the share of each contact is not unique: the start is the least-norm distribution, as of
-//! an elastic foundation, which neither order nor duplication of the rows changes, of what full stick needs. Where a cone forbids that, it is what the
-//! contacts carried before, and the least-norm distribution of what they lack of the correction before. The iteration goes on from there.
+//! more than the six unknowns, and the share of each contact is not unique: it is as near as the law allows to what the contacts start from. Full stick is
+//! shared with the least norm, as of an elastic foundation, which neither order nor duplication of the rows changes.
 //!
 //! Source: the contact laws are those of Moreau and Jean's non-smooth contact dynamics (Jean 1999), with displacements for velocities.
 
@@ -19,8 +18,6 @@ use crate::spatial::Vector6;
 pub(super) const MAX_CONE_CONTACTS: usize = 8;
 /// Regularisation of the least-norm distribution, relative to its trace: below it, directions that no contact holds.
 const LEAST_NORM_REGULARISATION: f64 = 1e-11;
-/// Share of full stick's correction that the cones may cut before it is relaxed: rounding.
-const STICK_TOLERANCE: f64 = 1e-9;
 
 /// The contacts of one cone problem; emptied and filled by each call.
 #[derive(Clone, Debug, Default)]
@@ -42,37 +39,23 @@ pub(super) struct Measure {
 pub(super) struct ConeAnswer {
     /// `L^T (a - a_u)`.
     pub(super) correction: Vector6,
-    /// Slip and penetration that are left, or what the cones cut of full stick, relative to the scale; 0 where full stick was the answer.
+    /// Slip and penetration that are left, or what the cones cut of full stick, relative to the scale.
     pub(super) residual: f64,
 }
 
 impl ConeProblem {
-    /// Solves the problem; the multipliers stay in the contacts. `likely` is a correction that may be near the answer.
+    /// Solves the problem from the multipliers in the contacts, where the new ones stay. `likely` is a correction that may be near the answer.
     ///
     /// Where the Newton iteration comes to its limit, full stick cut to the cones stays, and a residual that says how much was cut.
     pub(super) fn solve(&mut self, measure: Measure, likely: &Vector6) -> ConeAnswer {
-        let scale = measure.scale;
-        let held = Held::by(&self.contacts);
-        let before = self.contacts.clone();
-        let cut = self.start_from_stick(held.as_ref());
-        if cut <= STICK_TOLERANCE * scale {
-            return ConeAnswer {
-                correction: self.wrench(),
-                residual: 0.0,
-            };
-        }
-        self.contacts = before;
-        if let Some(held) = &held {
-            let lacking = likely - self.wrench();
-            self.share(&held.solve(&lacking));
-        }
-        let residual = self.balance(measure, likely);
-        if residual.is_none() {
-            self.start_from_stick(held.as_ref());
-        }
+        let balanced = self.balance(measure, likely);
+        let residual = balanced.unwrap_or_else(|| {
+            let held = Held::by(&self.contacts);
+            self.start_from_stick(held.as_ref()) / measure.scale
+        });
         ConeAnswer {
             correction: self.wrench(),
-            residual: residual.unwrap_or(cut / scale),
+            residual,
         }
     }
 

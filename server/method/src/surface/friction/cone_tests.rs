@@ -236,9 +236,10 @@ fn where_two_answers_keep_the_law_the_start_decides() {
     .map(|(point, normal)| (Vector3::from(point), Vector3::from(normal)));
     let problem = problem(0.2, &wished, &contacts);
     let scale = wished.norm();
-    let [one, other] = [0.0, 0.375].map(|z| {
-        let start = Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0);
-        let (solved, answer) = solved(&problem, start, scale);
+    let [one, other] = [1, 2].map(|loaded: usize| {
+        let mut problem = problem.clone();
+        problem.contacts[loaded].load = 0.5;
+        let (solved, answer) = solved(&problem, Vector6::zeros(), scale);
         let relaxed = oracle(solved).expect("it comes to an end");
         assert!((answer.correction - relaxed).norm() <= AMPLIFIED * NO_RESIDUAL * scale);
         relaxed

@@ -1,8 +1,9 @@
 //! Friction after the normal projection: the same function in both loops.
 //!
-//! The constrained acceleration of Eq. (1) tells which contacts touch. On these the cone problem is solved; its tangential
-//! multipliers are then a known wrench, and Eq. (1) is projected once more with that wrench in a_u. So the answer keeps its certificate
-//! (the normal rows hold exactly, whatever the cone problem left), and the multipliers of both parts balance `M (a_c - a_u)`.
+//! The constrained acceleration of Eq. (1), and the one that the tangential multipliers of the last answer would lead to, tell which contacts touch and
+//! what they bear. From there the cone problem is solved; its tangential multipliers are then a known wrench, and Eq. (1) is projected once more with
+//! that wrench in a_u. So the answer keeps its certificate (the normal rows hold exactly, whatever the cone problem left), and the multipliers of both
+//! parts balance `M (a_c - a_u)`.
 //!
 //! No energy is made: the tangential multipliers oppose the slip since the contact stuck last, or the cone problem is solved further, and friction
 //! dropped at last.
@@ -15,9 +16,7 @@ use super::carried::Carried;
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS, Measure};
 use super::selection::ContactRow;
 use crate::constraint::NonPenetrationConstraint;
-use crate::quasi_statics::{
-    HalfSpace, MAX_ACTIVE, Metric, Projection, ProjectionStatus, Projector,
-};
+use crate::quasi_statics::{MAX_ACTIVE, Metric, Projection, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{Pose, Vector6, six};
 use crate::world::World;
@@ -44,8 +43,6 @@ pub struct Friction {
     pub(super) cone: ConeProblem,
     /// The rows of the cone problem's contacts, in their order.
     pub(super) rows: ArrayVec<ContactRow, MAX_CONE_CONTACTS>,
-    /// `L^T (a - a_u)` of the last cone problem: the next one's may be near.
-    pub(super) last: Vector6,
     residual: f64,
     /// Length in the metric that the residual is relative to, m kg^(1/2).
     scale: f64,
@@ -66,9 +63,7 @@ pub struct FrictionProblem<'a> {
     pub carried: Carried<'a>,
     /// G, world, m.
     pub reference_point: &'a Point3<f64>,
-    /// The rows that were projected on.
-    pub rows: &'a [HalfSpace],
-    /// The constraint of each row.
+    /// The constraint of each row that was projected on.
     pub constraints: &'a [NonPenetrationConstraint],
     /// Poses of the reference point where the constraints were collected and where the rows were linearised anew, and whether with shading normals.
     pub moved: Option<(&'a Pose, &'a Pose, bool)>,
@@ -92,7 +87,7 @@ impl FrictionProblem<'_> {
 
 impl Friction {
     /// Most projections of one [`Friction::hold`].
-    pub(crate) const MAX_PROJECTIONS: u32 = MAX_REFINEMENTS as u32 + 1;
+    pub(crate) const MAX_PROJECTIONS: u32 = MAX_REFINEMENTS as u32 + 2;
 
     /// The friction of a world; `None` where every obstacle is frictionless: then there is nothing to pay.
     pub fn of(world: &World, settings: &Settings) -> Option<Self> {
@@ -108,7 +103,6 @@ impl Friction {
             touched: Vec::with_capacity(settings.max_constraints),
             cone: ConeProblem::default(),
             rows: ArrayVec::new(),
-            last: Vector6::zeros(),
             residual: 0.0,
             scale: 0.0,
             slid: true,
@@ -174,6 +168,7 @@ impl Friction {
         projector: &mut Projector,
         frictionless: Projection,
     ) -> Projection {
+        let stuck = self.acts && !self.slid;
         self.residual = 0.0;
         self.slid = true;
         self.acts = false;
@@ -191,65 +186,77 @@ impl Friction {
             return frictionless;
         }
         self.scale = scale;
-        if !self.gather(problem, &frictionless) {
+        let predicted = self.predicted(problem, &frictionless, projector);
+        let predicted = predicted.as_ref().unwrap_or(&frictionless);
+        if !self.gather(problem, projector.rows(), &frictionless, predicted, stuck) {
             self.forget();
             return frictionless;
-        }
-        if self.last == Vector6::zeros() {
-            self.last = metric.whiten(&(frictionless.acceleration - problem.unconstrained));
         }
         let mut measure = Measure {
             scale,
             no_slip: NO_SLIP_SHARE * self.touching,
         };
-        let mut answer = self.cone.solve(measure, &self.last);
+        let start = metric.whiten(&(predicted.acceleration - problem.unconstrained));
+        let mut answer = self.cone.solve(measure, &start);
         for _ in 0..MAX_ADDED {
-            if !self.add_violated(problem, &answer.correction) {
+            if !self.add_violated(problem, projector.rows(), &answer.correction) {
                 break;
             }
             answer = self.cone.solve_again(measure, &answer);
         }
-        let active: ArrayVec<u32, MAX_ACTIVE> =
-            frictionless.active.iter().map(|row| row.row).collect();
         let mut refinements = 0..MAX_REFINEMENTS;
         let held = loop {
-            let held = self.project_with_grip(problem, &active, projector);
-            let makes_energy = held.as_ref().is_some_and(|(_, it)| !self.dissipates(it));
+            let held = self.project_with_grip(problem, predicted, projector);
+            let makes_energy = held.as_ref().is_some_and(|it| {
+                let change = it.acceleration - problem.unconstrained;
+                !self.dissipates(&metric.whiten(&change))
+            });
             if !makes_energy || refinements.next().is_none() {
                 break held.filter(|_| !makes_energy);
             }
             measure.no_slip *= FINER;
             answer = self.cone.solve_again(measure, &answer);
         };
-        self.last = answer.correction;
-        let Some((projection, correction)) = held else {
+        let Some(held) = held else {
             self.residual = f64::INFINITY;
             return frictionless;
         };
+        let correction = metric.whiten(&(held.acceleration - problem.unconstrained));
         self.residual = answer.residual + (correction - answer.correction).norm() / scale;
         self.acts = true;
-        projection
+        held
     }
 
     /// The next contact finds nothing of those before.
-    fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.cone.contacts.clear();
         self.rows.clear();
-        self.last = Vector6::zeros();
     }
 
-    /// Eq. (1) once more, with the cone problem's tangential wrench in a_u; with its `L^T (a_c - a_u)`. `None` where it has no certificate.
+    /// The answer if friction still pulled as in the last one: which rows hold the body, and with what load. `None` without friction then.
+    fn predicted(
+        &self,
+        problem: &FrictionProblem<'_>,
+        frictionless: &Projection,
+        projector: &mut Projector,
+    ) -> Option<Projection> {
+        let pulled = self.cone.contacts.iter().any(|c| c.grip != [0.0; 2]);
+        let grip = || self.project_with_grip(problem, frictionless, projector);
+        pulled.then(grip).flatten()
+    }
+
+    /// Eq. (1) once more, with the cone problem's tangential wrench in a_u. `None` where it has no certificate.
     fn project_with_grip(
         &self,
         problem: &FrictionProblem<'_>,
-        likely: &[u32],
+        likely: &Projection,
         projector: &mut Projector,
-    ) -> Option<(Projection, Vector6)> {
+    ) -> Option<Projection> {
         let pulled = problem.unconstrained + problem.metric.unwhiten(&self.cone.grip_wrench());
-        let projection = projector.project_prepared(&pulled, likely);
-        let change = projection.acceleration - problem.unconstrained;
+        let likely: ArrayVec<u32, MAX_ACTIVE> = likely.active.iter().map(|row| row.row).collect();
+        let projection = projector.project_prepared(&pulled, &likely);
         let solved = projection.status == ProjectionStatus::Solved;
-        solved.then(|| (projection, problem.metric.whiten(&change)))
+        solved.then_some(projection)
     }
 
     /// Whether friction takes energy at this correction; notes whether a loaded contact slips.

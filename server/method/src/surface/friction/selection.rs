@@ -7,7 +7,7 @@ use super::cone::MAX_CONE_CONTACTS;
 use super::contact::{ConeContact, tangents_of};
 use super::hold::{Friction, FrictionProblem};
 use crate::constraint::{FeaturePair, NonPenetrationConstraint, contact_jacobian};
-use crate::quasi_statics::Projection;
+use crate::quasi_statics::{ActiveRow, Projection, Rows};
 use crate::spatial::{Vector6, linear};
 
 /// The row of a contact.
@@ -27,20 +27,24 @@ struct Carrying {
     grip: Vector3<f64>,
 }
 
+/// Multipliers from which the cone problem starts.
+struct Likely<'a> {
+    /// The rows that hold the body in the predicted answer; `None` where contacts bear what they bore.
+    pressing: Option<&'a [ActiveRow]>,
+    carrying: &'a [Carrying],
+}
+
 impl Friction {
     /// Makes the row that the correction violates most a contact, if by more than what touching contacts may differ; whether there is one and room for it.
     pub(super) fn add_violated(
         &mut self,
         problem: &FrictionProblem<'_>,
+        rows: &Rows,
         correction: &Vector6,
     ) -> bool {
         let acceleration = problem.unconstrained + problem.metric.unwhiten(correction);
-        let slacks = problem.rows.iter().map(|row| row.slack(&acceleration));
-        let rows = slacks
-            .enumerate()
-            .filter(|(_, slack)| *slack < -self.touching);
-        let deepest = rows.min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((index, _)) = deepest.filter(|(k, _)| !self.is_contact(*k as u32)) else {
+        let violated = rows.violated(&acceleration, self.touching);
+        let Some(index) = violated.filter(|row| !self.is_contact(*row)) else {
             return false;
         };
         if self.rows.is_full() {
@@ -50,7 +54,11 @@ impl Friction {
             self.rows.swap_remove(idle);
             self.cone.contacts.swap_remove(idle);
         }
-        self.add(problem, index as u32, &[])
+        let new = Likely {
+            pressing: None,
+            carrying: &[],
+        };
+        self.add(problem, rows, index, &new)
     }
 
     fn is_contact(&self, index: u32) -> bool {
@@ -69,46 +77,55 @@ impl Friction {
         carrying.collect()
     }
 
-    /// Fills the cone problem with the contacts that touch at the frictionless answer. False when none of them is frictional.
-    pub(super) fn gather(&mut self, problem: &FrictionProblem<'_>, now: &Projection) -> bool {
+    /// Fills the cone problem with the contacts that touch at the `frictionless` answer or at the `predicted` one, which loads them unless the body has
+    /// `stuck`: there the share of each contact must not change. False when none of them is frictional.
+    pub(super) fn gather(
+        &mut self,
+        problem: &FrictionProblem<'_>,
+        rows: &Rows,
+        frictionless: &Projection,
+        predicted: &Projection,
+        stuck: bool,
+    ) -> bool {
         let carrying = self.carrying();
-        self.cone.contacts.clear();
-        self.rows.clear();
+        self.forget();
         self.touched.clear();
-        let mut frictional = false;
-        // What touched with friction a moment ago most likely does so again.
-        let before = problem.unconstrained + problem.metric.unwhiten(&self.last);
-        let rows = problem.rows.iter().zip(problem.constraints);
-        for (index, (row, constraint)) in rows.enumerate() {
-            let slack = row.slack(&now.acceleration).min(row.slack(&before));
-            let touches = slack <= self.touching;
-            if touches && self.touched.len() < self.touched.capacity() {
-                self.touched.push(index as u32);
-                frictional |= self.coefficient_of(constraint) > 0.0;
-            }
-        }
+        let at = [&frictionless.acceleration, &predicted.acceleration];
+        rows.near(at, self.touching, &mut self.touched);
+        let frictional = self.touched.iter().any(|row| {
+            let constraint = problem.constraints.get(*row as usize);
+            constraint.is_some_and(|row| self.coefficient_of(row) > 0.0)
+        });
         if !frictional {
             return false;
         }
-        // Those that hold the body now; those that did so a moment ago, as they most likely do so again; and of the others, where they are more
+        // Those that are likely to hold the body; those that did so a moment ago, as they most likely do so again; and of the others, where they are more
         // than the cone problem takes, every n-th.
-        for active in &now.active {
-            self.add(problem, active.row, &carrying);
+        let likely = Likely {
+            pressing: (!stuck).then_some(&predicted.active[..]),
+            carrying: &carrying,
+        };
+        for active in &predicted.active {
+            self.add(problem, rows, active.row, &likely);
         }
         for before in &carrying {
             let found = problem
                 .constraints
                 .binary_search_by_key(&before.features, |row| row.features);
             if let Ok(index) = found {
-                self.add(problem, index as u32, &carrying);
+                self.add(problem, rows, index as u32, &likely);
             }
         }
-        let Self { touched, rows, .. } = self;
-        touched.retain(|index| rows.iter().all(|row| row.index != *index));
+        let Self {
+            touched,
+            rows: contacts,
+            ..
+        } = self;
+        touched.retain(|index| contacts.iter().all(|row| row.index != *index));
         let room = MAX_CONE_CONTACTS - self.rows.len();
         let stride = self.touched.len().div_ceil(room.max(1)).max(1);
         for k in (0..self.touched.len()).step_by(stride) {
-            self.add(problem, self.touched[k], &carrying);
+            self.add(problem, rows, self.touched[k], &likely);
         }
         !self.rows.is_empty()
     }
@@ -118,11 +135,16 @@ impl Friction {
         self.coefficients.get(obstacle).copied().unwrap_or(0.0)
     }
 
-    /// Makes a row a contact that carries what it carried `before`, if there is room; whether it is a new one.
-    fn add(&mut self, problem: &FrictionProblem<'_>, index: u32, before: &[Carrying]) -> bool {
+    /// Makes a row a contact that carries what is likely, if there is room; whether it is a new one.
+    fn add(
+        &mut self,
+        problem: &FrictionProblem<'_>,
+        rows: &Rows,
+        index: u32,
+        likely: &Likely<'_>,
+    ) -> bool {
         let at = index as usize;
-        let (Some(row), Some(constraint)) = (problem.rows.get(at), problem.constraints.get(at))
-        else {
+        let (Some(row), Some(constraint)) = (rows.get(at), problem.constraints.get(at)) else {
             return false;
         };
         if self.is_contact(index) || self.rows.is_full() {
@@ -148,9 +170,15 @@ impl Friction {
             return false;
         };
         let features = constraint.features;
-        if let Some(carried) = before.iter().find(|before| before.features == features) {
-            contact.load = carried.load;
-            contact.grip = directions.map(|t| t.dot(&carried.grip));
+        let mut carrying = likely.carrying.iter();
+        let before = carrying.find(|before| before.features == features);
+        if let Some(before) = before {
+            contact.load = before.load;
+            contact.grip = directions.map(|t| t.dot(&before.grip));
+        }
+        if let Some(pressing) = likely.pressing {
+            let active = pressing.iter().find(|active| active.row == index);
+            contact.load = active.map_or(0.0, |active| active.multiplier);
         }
         self.cone.contacts.push(contact);
         self.rows.push(ContactRow {
