@@ -38,6 +38,9 @@ pub(crate) fn for_violated(
     mut found: impl FnMut(&Contact),
 ) {
     let placement = Placement::of(body_pose, obstacle_pose);
+    if placement.is_beyond(asked.reach, body, obstacle) {
+        return;
+    }
     let trees = (body.wide_tree(), obstacle.wide_tree());
     let volumes = FacingVolumes::still(
         trees,

@@ -21,8 +21,8 @@ const LONGER_WAY: f64 = 0.5;
 /// Share of the motion tolerance by which a row that was left out may be violated. By the whole of it, rows a millimetre apart would let a
 /// body be turned by tens of microradians, and a torque about the axis of a hole of millionths of the force be felt; a row more costs a microsecond.
 const ROW_TOLERANCE_SHARE: f64 = 1e-3;
-/// Motions of a published set whose answers turn: where the device is, and where it goes on to.
-const TURNING_MOTIONS: usize = 2;
+/// The first motions of a published set: where the device is, and where it goes on to. The answers of these turn.
+pub(super) const LEADING_MOTIONS: usize = 2;
 /// Most rows that are added one by one where friction or a moving obstacle leads.
 const MAX_ADDED: u32 = 24;
 
@@ -120,7 +120,7 @@ impl GodObject {
         let probes = self.probes(difference, reach);
         // Where every pair is a row, those remain that they turn into.
         let asked = if all == Some(true) {
-            TURNING_MOTIONS
+            LEADING_MOTIONS
         } else {
             MAX_MOTIONS
         };
@@ -132,7 +132,7 @@ impl GodObject {
         if met == Some(true) {
             if all != Some(true) {
                 // The rows of the other probes are there, and no corner asks for more of them.
-                self.complete_for_force(&probes[..TURNING_MOTIONS], work);
+                self.complete_for_force(&probes[..LEADING_MOTIONS], work);
             }
             self.with_reduction(|this, reduction, at| {
                 reduction.forget_corners((at, &this.surfaces(None)));
@@ -214,7 +214,7 @@ impl GodObject {
     ) -> ArrayVec<Vector6, MAX_MOTIONS> {
         let wished = Wished {
             motions,
-            turning: TURNING_MOTIONS,
+            turning: LEADING_MOTIONS,
             purpose,
         };
         let projections = reduction.complete((at, &self.surfaces(None)), &wished, work);

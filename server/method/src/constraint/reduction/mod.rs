@@ -209,6 +209,11 @@ impl RowReduction {
         self.known.len() >= self.room
     }
 
+    /// Whether the set has room for as many rows as are ever known: otherwise rows of what may be would take the place of rows of what is.
+    pub(crate) fn has_whole_room(&self) -> bool {
+        self.room == MAX_ROWS
+    }
+
     /// Rows of the present pose that hold beside those that are chosen, in a set of at most `capacity` rows.
     pub(crate) fn give(&mut self, at: &At, rows: &[NonPenetrationConstraint], capacity: usize) {
         self.room = MAX_ROWS.min(capacity.saturating_sub(rows.len()));
