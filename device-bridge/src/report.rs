@@ -6,7 +6,7 @@ use std::time::Duration;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-use crate::verdict::{said_of_misses, said_of_safety_events, verdict};
+use crate::verdict::{said_of_kept, said_of_misses, said_of_safety_events, verdict};
 
 /// A histogram of durations from 1 us to 60 s with three digits. Recording does not allocate.
 pub(crate) struct Durations(Histogram<u64>);
@@ -150,8 +150,9 @@ impl BridgeReport {
             said_of_safety_events(self.safety_events),
         ];
         let faults: Vec<String> = faults.into_iter().flatten().collect();
-        let good = "good, periods kept, device and server always there, no safety event";
-        format!("verdict: {}", verdict(good, &faults))
+        let kept = said_of_kept("periods", self.ticks, self.missed_periods);
+        let good = format!("good, {kept}, device and server always there, no safety event");
+        format!("verdict: {}", verdict(&good, &faults))
     }
 }
 
@@ -222,7 +223,13 @@ mod tests {
             sessions: 1,
             ..BridgeReport::default()
         };
-        assert!(report.verdict().contains("good"), "{}", report.verdict());
+        let verdict = report.verdict();
+        assert!(
+            verdict.contains("good, all but 0.050 % of periods kept"),
+            "{verdict}"
+        );
+        report.missed_periods = 0;
+        assert!(report.verdict().contains("good, periods kept"));
         report.missed_periods = 200;
         report.sessions = 3;
         report.safety_events = 4;

@@ -16,6 +16,16 @@ pub fn said_of_misses(what: [&str; 2], ticks: u64, missed: u64) -> Option<String
     })
 }
 
+/// How the same loop did where that is no fault: of what the times are called, as "periods".
+#[must_use]
+pub fn said_of_kept(times: &str, ticks: u64, missed: u64) -> String {
+    if missed == 0 {
+        return format!("{times} kept");
+    }
+    let share = missed as f64 / (ticks + missed) as f64;
+    format!("all but {:.3} % of {times} kept", 100.0 * share)
+}
+
 /// What is said of so many events of the safety stage, if there was one.
 #[must_use]
 pub fn said_of_safety_events(count: u64) -> Option<String> {

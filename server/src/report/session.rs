@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use taut_bridge::verdict::{said_of_misses, said_of_safety_events, verdict};
+use taut_bridge::verdict::{said_of_kept, said_of_misses, said_of_safety_events, verdict};
 use taut_link::Distribution;
 
 use crate::loops::fidelity::FidelityReport;
@@ -120,8 +120,10 @@ impl SessionReport {
             }
         }
         faults.extend(said_of_safety_events(self.safety_events));
-        let good = "good: deadlines kept, no penetration, no safety event";
-        format!("verdict             {}", verdict(good, &faults))
+        let ticks = self.haptics_period_us.count;
+        let kept = said_of_kept("deadlines", ticks, self.deadline_misses);
+        let good = format!("good: {kept}, no penetration, no safety event");
+        format!("verdict             {}", verdict(&good, &faults))
     }
 
     /// The periods of the haptics loop as a histogram, one line per bin that is not empty.
@@ -280,7 +282,9 @@ mod tests {
             deadline_misses: 5,
             ..SessionReport::default()
         };
-        assert!(report.verdict().contains("good"), "{}", report.verdict());
+        let verdict = report.verdict();
+        let good = "good: all but 0.050 % of deadlines kept";
+        assert!(verdict.contains(good), "{verdict}");
         report.stops_without_force = 7;
         report.deadline_misses = 200;
         report.penetrations = 1;

@@ -199,7 +199,7 @@ impl FrameMaster {
             match state {
                 Some(NodeState::Synced) => tracing::info!(node, "frames in step"),
                 Some(NodeState::Late) => tracing::debug!(node, "late at a frame"),
-                Some(NodeState::FreeRunning) => tracing::warn!(
+                Some(NodeState::FreeRunning) => tracing::info!(
                     node,
                     "free-running: it draws fewer frames than the least rate, or than it says"
                 ),

@@ -2,8 +2,9 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::beyond::{Beyond, OneToEight, beyond};
+use super::beyond::{Beyond, beyond};
 use super::facing_volumes::{FacingVolumes, Side};
+use super::one_to_eight::OneToEight;
 use super::turned::TurnedNodes;
 use super::windows::{Window, Windows, windows};
 use super::work::Work;

@@ -2,97 +2,23 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::advancement::{PairSearch, PiecePair};
+use super::advancement::PairSearch;
 use super::agenda::{Agenda, Part, Waiting};
-use super::collider::Collider;
 use super::descent::{AT_ONCE, InMotion, Opened, at_once, open};
-use super::facing_volumes::{FacingVolumes, Side};
-use super::impact::{AdvancementSettings, First};
+use super::facing_volumes::Side;
+use super::impact::First;
 use super::intervals::{Interval, Intervals, WHOLE, halvings};
-use super::motion::RelativeMotion;
+use super::problem::{Problem, stays_beyond};
 use super::turned::TurnedNodes;
 use super::windows::{Window, Windows};
 use super::work::Work;
-use super::workspace::CollisionWorkspace;
+use super::workspace::{CollisionWorkspace, Memory};
 use crate::geometry::Primitive;
-use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
+use crate::geometry::wide_tree::{Below, ROOT, WideTree};
 
 /// When volumes come near is worked out where the body moves by more than this share of the larger one's radius in half an interval. Otherwise
 /// they count as near in all of the window of what they are in, which is the cheaper test.
 const TIMED_SHARE: f32 = 0.5;
-
-/// A body on its way and an obstacle.
-pub(super) struct Problem<'a> {
-    pub(super) body: Collider<'a>,
-    pub(super) obstacle: Collider<'a>,
-    pub(super) relative: &'a RelativeMotion,
-    /// Radius of the body about G, m.
-    pub(super) radius: f64,
-    pub(super) settings: &'a AdvancementSettings,
-}
-
-impl Problem<'_> {
-    #[inline]
-    pub(super) fn pair(&self, a: u32, b: u32) -> PiecePair {
-        let (on_body, body_normal) = self.body.piece(a);
-        let (on_obstacle, obstacle_normal) = self.obstacle.piece(b);
-        PiecePair {
-            on_body,
-            body_normal,
-            on_obstacle,
-            obstacle_normal,
-        }
-    }
-
-    /// The primitive that a mesh is searched against, and whose the mesh is.
-    fn primitive(&self) -> Option<(&Primitive, Side)> {
-        match (&self.body, &self.obstacle) {
-            (Collider::Mesh(_), Collider::Primitive(primitive)) => Some((primitive, Side::Body)),
-            (Collider::Primitive(primitive), Collider::Mesh(_)) => {
-                Some((primitive, Side::Obstacle))
-            }
-            _ => None,
-        }
-    }
-
-    /// The trees of both; `leaves` become those of primitives.
-    pub(super) fn trees<'t>(
-        &'t self,
-        [body, obstacle]: &'t mut [WideTree; 2],
-    ) -> (&'t WideTree, &'t WideTree) {
-        let start = self.relative.start();
-        let reached = (
-            &start,
-            self.relative.length(self.radius) + 2.0 * self.radius,
-        );
-        (
-            self.body.tree(body, reached),
-            self.obstacle.tree(obstacle, reached),
-        )
-    }
-}
-
-/// Whether the mesh's volume of a pair stays beyond a primitive in an interval. The primitive is on one side of the plane through its point nearest to the
-/// volume's centre; the volume is on the other while the centre's distance exceeds its extent and what the interval adds. Boxes say little of what is round.
-#[inline]
-fn stays_beyond(
-    (primitive, side): (&Primitive, Side),
-    volumes: &FacingVolumes,
-    trees: (&WideTree, &WideTree),
-    pair: (Child, Child),
-) -> bool {
-    let (tree, child, other) = match side {
-        Side::Body => (trees.0, pair.0, trees.1),
-        Side::Obstacle => (trees.1, pair.1, trees.0),
-    };
-    let center = tree.center(child);
-    let (at, added) = volumes.seen_by_other(side, &center);
-    let nearest = primitive.nearest(&(other.origin + at));
-    let radius = f64::from(tree.radius(child));
-    let in_mesh = volumes.frame(side).turn.tr_mul(&nearest.normal);
-    let extent = tree.extent(child, &in_mesh).min(radius);
-    nearest.distance > extent + added.along(&nearest.normal, radius) // false for NaN
-}
 
 /// A search for every pair of pieces that may face each other within the gap at some time before the first impact so far, with the vectors
 /// that the processor has.
@@ -194,39 +120,127 @@ impl Halving<'_> {
     }
 }
 
+/// The pairs of pieces that a search meets.
+struct Pieces<'a, 'p> {
+    problem: &'a Problem<'p>,
+    search: &'a PairSearch<'p>,
+    memory: &'a Memory,
+}
+
+impl Pieces<'_, '_> {
+    /// Follows a pair through a part of an interval where it is not free there; whether it was followed.
+    #[inline(always)]
+    fn look_at(
+        &self,
+        (t, s): (u32, u32),
+        interval: &Interval,
+        [from, to]: [f64; 2],
+        first: &mut First,
+        work: &mut Work,
+    ) -> bool {
+        work.triangle_pairs += 1;
+        let pair = self.problem.pair(t, s);
+        let times = [interval.from, from, to];
+        let search = self.search;
+        // Witnesses were followed before.
+        if search.is_free(&pair, &interval.start, times, &first.lately) || self.memory.has((t, s)) {
+            return false;
+        }
+        let start = if from > interval.from {
+            self.problem.relative.at(from)
+        } else {
+            interval.start
+        };
+        let outcome = search.follow(&pair, &start, [from, to], &mut first.lately, work);
+        first.take(outcome, (t, s), from);
+        true
+    }
+}
+
+/// A search under way.
+struct Run<'a, 'p> {
+    pieces: Pieces<'a, 'p>,
+    halving: Halving<'a>,
+    queue: Queue<'a>,
+    turned: &'a mut TurnedNodes,
+    first: &'a mut First,
+    work: &'a mut Work,
+    primitive: Option<(&'a Primitive, Side)>,
+    /// Where the search ends if nothing is met.
+    end: f64,
+}
+
+impl Run<'_, '_> {
+    /// Looks at a pair that waited: pieces are followed, and what comes of volumes is what was found when one was opened, in which interval.
+    #[inline(always)]
+    fn look_at(&mut self, mut next: Waiting) -> Option<(Opened<Windows>, u32)> {
+        let (turned, first) = (&mut *self.turned, &mut *self.first);
+        let trees = self.halving.trees;
+        let (a, b) = next.pair;
+        let size = trees.0.radius(a).max(trees.1.radius(b));
+        self.halving
+            .straighten(&mut next, size, &mut self.queue, turned, self.work);
+        let interval = self.halving.interval(next.interval, turned);
+        let [from, to] = interval.times(next.window);
+        let to = to.min(first.time);
+        let later = from >= first.time || (first.is_near() && from > 0.0);
+        if (later && from > 0.0) || first.overlapping {
+            return None;
+        }
+        let volumes = &interval.volumes;
+        let beyond = |primitive| stays_beyond(primitive, volumes, trees, next.pair);
+        if self.primitive.is_some_and(beyond) {
+            return None;
+        }
+        if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
+            let pieces = &self.pieces;
+            if pieces.look_at((t, s), interval, [from, to], first, self.work) {
+                self.queue.last = Part::of((first.time / self.end) as f32);
+            }
+            return None;
+        }
+        self.work.node_pairs += 1;
+        let timed = volumes.sweeps_more_than(TIMED_SHARE * size);
+        let window = next.window;
+        let pair = if timed {
+            open(&InMotion::<true>(window), trees, volumes, turned, next.pair)
+        } else {
+            open(
+                &InMotion::<false>(window),
+                trees,
+                volumes,
+                turned,
+                next.pair,
+            )
+        };
+        Some((pair, next.interval))
+    }
+
+    /// Lets those wait that meet, of what was opened.
+    #[inline(always)]
+    fn push(&mut self, opened: &Opened<Windows>, number: u32) {
+        let interval = self.halving.interval(number, self.turned);
+        opened.for_each(opened.found.meeting(), |pair, lane| {
+            let window = opened.found.of(lane);
+            let next = Waiting {
+                pair,
+                interval: number,
+                window,
+            };
+            self.queue.push(interval.part(window.enter), next);
+        });
+    }
+}
+
 impl WithSimd for DescentInMotion<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self {
-            problem,
-            search,
-            first,
-            workspace,
-            work,
-        } = self;
-        let CollisionWorkspace {
-            agenda,
-            stack,
-            memories,
-            current,
-            intervals,
-            turned,
-            leaves,
-            ..
-        } = workspace;
-        let trees = problem.trees(leaves);
-        let primitive = problem.primitive();
-        let memory = &memories[*current];
-        intervals.restart(first.time, search.gaps.stop);
-        let mut halving = Halving {
-            problem,
-            intervals,
-            trees,
-            most: halvings(problem.settings.max_intervals),
-            share: problem.settings.interval_edges as f32,
-        };
+        let (problem, workspace) = (self.problem, self.workspace);
+        let (stack, agenda) = (&mut workspace.stack, &mut workspace.agenda);
+        let intervals = &mut workspace.intervals;
+        intervals.restart(self.first.time, self.search.gaps.stop);
         stack.clear();
         agenda.clear();
         stack.push(Waiting {
@@ -234,80 +248,48 @@ impl WithSimd for DescentInMotion<'_, '_> {
             interval: WHOLE,
             window: Window::WHOLE,
         });
-        let mut queue = Queue {
-            stack,
-            agenda,
-            now: Part::FIRST,
-            last: Part::of(1.0),
+        let mut run = Run {
+            pieces: Pieces {
+                problem,
+                search: self.search,
+                memory: &workspace.memories[workspace.current],
+            },
+            halving: Halving {
+                problem,
+                intervals,
+                trees: problem.trees(&mut workspace.leaves),
+                most: halvings(problem.settings.max_intervals),
+                share: problem.settings.interval_edges as f32,
+            },
+            queue: Queue {
+                stack,
+                agenda,
+                now: Part::FIRST,
+                last: Part::of(1.0),
+            },
+            turned: &mut workspace.turned,
+            primitive: problem.primitive(),
+            end: self.first.time,
+            first: self.first,
+            work: self.work,
         };
-        let end = first.time;
         let mut opened = [(Opened::nothing(Windows::NONE), WHOLE); AT_ONCE];
         loop {
-            let (most, mut count) = (at_once(queue.stack.len()), 0);
+            let (most, mut count) = (at_once(run.queue.stack.len()), 0);
             while count < most
-                && let Some(mut next) = queue.pop(count == 0)
+                && let Some(next) = run.queue.pop(count == 0)
             {
-                let (a, b) = next.pair;
-                let size = trees.0.radius(a).max(trees.1.radius(b));
-                halving.straighten(&mut next, size, &mut queue, turned, work);
-                let interval = halving.interval(next.interval, turned);
-                let [from, to] = interval.times(next.window);
-                let to = to.min(first.time);
-                let later = from >= first.time || (first.is_near() && from > 0.0);
-                if (later && from > 0.0) || first.overlapping {
-                    continue;
+                if let Some(found) = run.look_at(next) {
+                    opened[count] = found;
+                    count += 1;
                 }
-                if primitive.is_some_and(|p| stays_beyond(p, &interval.volumes, trees, (a, b))) {
-                    continue;
-                }
-                if let (Below::Triangle(t), Below::Triangle(s)) =
-                    (trees.0.below(a), trees.1.below(b))
-                {
-                    work.triangle_pairs += 1;
-                    let pair = problem.pair(t, s);
-                    let times = [interval.from, from, to];
-                    if !search.is_free(&pair, &interval.start, times, &first.lately)
-                        && !memory.has((t, s))
-                    {
-                        let start = if from > interval.from {
-                            problem.relative.at(from)
-                        } else {
-                            interval.start
-                        };
-                        let outcome =
-                            search.follow(&pair, &start, [from, to], &mut first.lately, work);
-                        first.take(outcome, (t, s), from);
-                        queue.last = Part::of((first.time / end) as f32);
-                    }
-                    continue;
-                }
-                work.node_pairs += 1;
-                let volumes = &interval.volumes;
-                let timed = volumes.sweeps_more_than(TIMED_SHARE * size);
-                let (pair, window) = ((a, b), next.window);
-                let pair = if timed {
-                    open(&InMotion::<true>(window), trees, volumes, turned, pair)
-                } else {
-                    open(&InMotion::<false>(window), trees, volumes, turned, pair)
-                };
-                opened[count] = (pair, next.interval);
-                count += 1;
             }
             if count == 0 {
                 break;
             }
             // What waited last goes on first.
-            for (opened, number) in opened[..count].iter().rev() {
-                let interval = halving.interval(*number, turned);
-                opened.for_each(opened.found.meeting(), |pair, lane| {
-                    let window = opened.found.of(lane);
-                    let next = Waiting {
-                        pair,
-                        interval: *number,
-                        window,
-                    };
-                    queue.push(interval.part(window.enter), next);
-                });
+            for (pair, number) in opened[..count].iter().rev() {
+                run.push(pair, *number);
             }
         }
     }

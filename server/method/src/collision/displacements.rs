@@ -20,7 +20,8 @@ use nalgebra::{Point3, Vector3};
 use super::facing_volumes::Side;
 use super::single::{dot, product, smaller, sum};
 use crate::geometry::lanes::{LANES, Lanes};
-use crate::geometry::wide_tree::{WideNode, WideTree};
+use crate::geometry::wide_node::WideNode;
+use crate::geometry::wide_tree::WideTree;
 use crate::spatial::{Pose, Vector6, angular, linear};
 
 /// Most motions of one search: where a device is and where it goes on to, and as far as it reaches from there along and about each axis.

@@ -22,6 +22,8 @@ mod known_apart;
 mod motion;
 mod moving_piece;
 mod obstacle_way;
+mod one_to_eight;
+mod problem;
 #[cfg(test)]
 mod processors_tests;
 mod single;

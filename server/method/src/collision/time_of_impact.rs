@@ -27,10 +27,11 @@ use nalgebra::Point3;
 
 use super::advancement::PairSearch;
 use super::collider::{Collider, Swept};
-use super::descent_in_motion::{DescentInMotion, Problem};
+use super::descent_in_motion::DescentInMotion;
 use super::gaps::Gaps;
 use super::impact::{AdvancementSettings, First, TimeOfImpact};
 use super::motion::{Motion, RelativeMotion};
+use super::problem::Problem;
 use super::work::Work;
 use super::workspace::CollisionWorkspace;
 use crate::spatial::Pose;

@@ -9,7 +9,8 @@ use pulp::{Arch, Simd, WithSimd};
 use super::facing_volumes::{FacingVolumes, Side};
 use super::single::{apply, dot, product, sum};
 use crate::geometry::lanes::{LANES, Lanes};
-use crate::geometry::wide_tree::{Child, WideNode, WideTree};
+use crate::geometry::wide_node::WideNode;
+use crate::geometry::wide_tree::{Child, WideTree};
 
 /// Nodes of each tree that are kept turned: a quarter more of them would not fit the first cache, half as many are turned more often.
 const KEPT: usize = 32;

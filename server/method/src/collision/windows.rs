@@ -1,8 +1,8 @@
 //! One volume against eight of the other tree on the way of a motion: when can surfaces inside come near, facing each other? Why and how exactly:
 //! [`facing_volumes`](super::facing_volumes).
 
-use super::beyond::OneToEight;
-use super::facing_volumes::{CHORD_ROUNDING, COSINE_ROUNDING};
+use super::facing_volumes::CHORD_ROUNDING;
+use super::one_to_eight::{OfEight, OneToEight};
 use super::single::{dot, larger, product, smaller, sum};
 use crate::geometry::lanes::{LANES, Lanes};
 
@@ -86,91 +86,45 @@ pub(super) fn windows<const THE_ONE_MOVES: bool, const TIMED: bool>(
     pairs: &OneToEight,
     window: Window,
 ) -> Windows {
-    let &OneToEight {
-        volumes,
-        turned,
-        lane,
-        node,
-    } = pairs;
-    let lane = lane % LANES;
-    let one = |x: &Lanes| x.0[lane];
-    let three = |v: &[Lanes; 3]| [one(&v[0]), one(&v[1]), one(&v[2])];
-    let q_center = pairs.center();
-    let (q_reach, q_axis) = (three(&turned.reach), three(&turned.axis));
-    let (u, v) = (three(&turned.tangents[0]), three(&turned.tangents[1]));
-    let (side_u, side_v) = (one(&turned.sides[0]), one(&turned.sides[1]));
-    let (q_middle, q_slab) = (one(&turned.middle), one(&turned.slab));
-    let (q_cosine, q_sine) = (one(&turned.cosine), one(&turned.sine));
-    let (q_sweep, q_stray_axis, q_turning) = (
-        three(&turned.sweep),
-        one(&turned.stray_along_axis),
-        one(&turned.turning),
-    );
+    let (volumes, turned, node) = (pairs.volumes, pairs.turned, pairs.node);
+    let one = pairs.one();
+    let of_lane = |x: &Lanes| x.0[pairs.lane % LANES];
     // The eight are the body's, seen in its own axes; or the one is.
     let (path, spin, angle) = volumes.path_in_body_axes();
     let path = sum(path, &product(spin, &node.origin));
-    let stray = volumes.stray;
-
-    let n = node;
     let mut found = Windows::NONE;
     for k in 0..LANES {
-        let c = [n.center[0].0[k], n.center[1].0[k], n.center[2].0[k]];
-        let a = [n.axis[0].0[k], n.axis[1].0[k], n.axis[2].0[k]];
-        let t = [n.tangent[0].0[k], n.tangent[1].0[k], n.tangent[2].0[k]];
-        let b = product(&a, &t);
-        let (slab, middle) = (n.slab.0[k], n.middle.0[k]);
-        let (along, across) = (n.along.0[k], n.across.0[k]);
-        let d = [q_center[0] - c[0], q_center[1] - c[1], q_center[2] - c[2]];
-        let cosine = dot(&a, &q_axis);
+        let it = OfEight::of(node, k);
+        let d = one.from(&it);
+        let cosine = dot(&it.axis, &one.axis);
         // Seen along an axis, points stray by what the axes' own turn lets them; the axes differ by a chord.
         let chord = ((2.0 - 2.0 * cosine).max(0.0) + CHORD_ROUNDING).sqrt();
-        let (s, turning, stray_a);
+        let (s, turning, along_axis, about_center);
         if THE_ONE_MOVES {
-            s = q_sweep;
+            let sweep = &turned.sweep;
+            s = [of_lane(&sweep[0]), of_lane(&sweep[1]), of_lane(&sweep[2])];
             turning = 0.0;
-            stray_a = stray + chord.mul_add(q_turning, q_stray_axis);
+            along_axis = of_lane(&turned.stray_along_axis);
+            about_center = of_lane(&turned.turning);
         } else {
-            let sweep = sum(&path, &product(spin, &c));
+            let sweep = sum(&path, &product(spin, &it.center));
             s = [-sweep[0], -sweep[1], -sweep[2]];
-            turning = angle * n.radius.0[k];
-            let along_axis = dot(spin, &b)
-                .abs()
-                .mul_add(along, dot(spin, &t).abs() * across);
-            stray_a = stray + chord.mul_add(turning, along_axis);
+            turning = angle * node.radius.0[k];
+            let (on_b, on_t) = (dot(spin, &it.binormal).abs(), dot(spin, &it.tangent).abs());
+            along_axis = on_b.mul_add(it.along, on_t * it.across);
+            about_center = turning;
         }
+        let stray = volumes.stray + chord.mul_add(about_center, along_axis);
         let mut within = [window.enter, window.leave];
-        // Along the sides of the boxes.
+        // Along the sides of the boxes, the axis of one of the eight, and that of the one.
         for i in 0..3 {
-            meet::<TIMED>(
-                &mut within,
-                d[i],
-                s[i],
-                n.half[i].0[k] + q_reach[i] + turning,
-            );
+            let reach = node.half[i].0[k] + one.reach[i] + turning;
+            meet::<TIMED>(&mut within, d[i], s[i], reach);
         }
-        // Along the axes of the eight, and along that of the one.
-        let slant = cosine.abs();
-        let height = dot(&a, &d) + cosine.mul_add(q_middle, -middle);
-        let extent = dot(&a, &u).abs().mul_add(
-            side_u,
-            dot(&a, &v)
-                .abs()
-                .mul_add(side_v, slant.mul_add(q_slab, slab)),
-        );
-        meet::<TIMED>(&mut within, height, dot(&a, &s), extent + stray_a);
-        let height = dot(&q_axis, &d) + cosine.mul_add(-middle, q_middle);
-        let extent = dot(&q_axis, &t).abs().mul_add(
-            along,
-            dot(&q_axis, &b)
-                .abs()
-                .mul_add(across, slant.mul_add(slab, q_slab)),
-        );
-        meet::<TIMED>(&mut within, height, dot(&q_axis, &s), extent + stray_a);
-        // Cones: the sum of two angles is above pi where its sine is not above zero.
-        let (cos, sin) = (n.cosine.0[k], n.sine.0[k]);
-        let narrow = sin.mul_add(q_cosine, cos * q_sine) > 0.0;
-        let away = cosine < cos.mul_add(q_cosine, -(sin * q_sine)) - COSINE_ROUNDING;
-        let apart = (narrow & away) | (within[0] > within[1]); // false for NaN
+        let [(height_a, extent_a), (height_b, extent_b)] = one.along_axes(&it, &d);
+        meet::<TIMED>(&mut within, height_a, dot(&it.axis, &s), extent_a + stray);
+        meet::<TIMED>(&mut within, height_b, dot(&one.axis, &s), extent_b + stray);
+        let apart = one.faces_away(&it) | (within[0] > within[1]); // false for NaN
         found.enters.0[k] = within[0];
         found.leaves.0[k] = within[1];
         found.bits[k] = if apart { 0 } else { 1 << k };

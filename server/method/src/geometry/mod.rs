@@ -22,6 +22,7 @@ mod thin_parts;
 mod topology;
 mod tree;
 pub(crate) mod volume;
+pub(crate) mod wide_node;
 pub(crate) mod wide_tree;
 
 pub use mass::{MassProperties, mass_properties};

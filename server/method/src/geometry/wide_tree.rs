@@ -9,6 +9,7 @@ use super::lanes::{LANES, Lanes};
 use super::normal_cone::NormalCone;
 use super::tree::Tree;
 use super::volume::{Source, Volume};
+use super::wide_node::WideNode;
 
 /// What a flat volume counts as in thickness, per radius.
 const THICKNESS_PER_RADIUS: f32 = 0.01;
@@ -19,24 +20,6 @@ const TRIANGLE: u32 = 1 << 31;
 pub(crate) type Child = u32;
 /// The child that holds the whole mesh.
 pub(crate) const ROOT: Child = 0;
-
-/// Eight children, a lane each. Lanes without a child have boxes that meet nothing.
-#[derive(Clone, Debug)]
-pub(crate) struct WideNode {
-    /// The point from which its children's centres are taken, from the tree's origin, m: about the middle of them.
-    pub(crate) origin: [f32; 3],
-    pub(crate) center: [Lanes; 3],
-    pub(crate) half: [Lanes; 3],
-    pub(crate) axis: [Lanes; 3],
-    pub(crate) tangent: [Lanes; 3],
-    pub(crate) middle: Lanes,
-    pub(crate) slab: Lanes,
-    pub(crate) along: Lanes,
-    pub(crate) across: Lanes,
-    pub(crate) radius: Lanes,
-    pub(crate) cosine: Lanes,
-    pub(crate) sine: Lanes,
-}
 
 /// What a descent asks of a child before it opens it: a quarter of a cache line.
 #[derive(Clone, Copy, Debug, Default)]
@@ -218,62 +201,6 @@ impl WideTree {
         } else {
             Below::Node(below)
         }
-    }
-}
-
-impl WideNode {
-    fn empty(origin: [f32; 3]) -> Self {
-        let zero = Lanes::splat(0.0);
-        Self {
-            origin,
-            center: [zero; 3],
-            half: [Lanes::splat(f32::NEG_INFINITY); 3],
-            axis: [zero; 3],
-            tangent: [zero; 3],
-            middle: zero,
-            slab: zero,
-            along: zero,
-            across: zero,
-            radius: zero,
-            cosine: zero,
-            sine: zero,
-        }
-    }
-
-    /// The volume of lane `k`, without what lies below.
-    #[cfg(test)]
-    fn child(&self, k: usize) -> Volume {
-        let three = |v: &[Lanes; 3]| [v[0].0[k], v[1].0[k], v[2].0[k]];
-        Volume {
-            center: three(&self.center),
-            half: three(&self.half),
-            axis: three(&self.axis),
-            tangent: three(&self.tangent),
-            middle: self.middle.0[k],
-            slab: self.slab.0[k],
-            along: self.along.0[k],
-            across: self.across.0[k],
-            radius: self.radius.0[k],
-            cosine: self.cosine.0[k],
-            sine: self.sine.0[k],
-            owned: 0,
-        }
-    }
-
-    fn set(&mut self, k: usize, volume: &Volume) {
-        for i in 0..3 {
-            self.center[i].0[k] = volume.center[i];
-            self.half[i].0[k] = volume.half[i];
-            self.axis[i].0[k] = volume.axis[i];
-            self.tangent[i].0[k] = volume.tangent[i];
-        }
-        self.middle.0[k] = volume.middle;
-        self.slab.0[k] = volume.slab;
-        self.along.0[k] = volume.along;
-        self.across.0[k] = volume.across;
-        self.radius.0[k] = volume.radius;
-        self.cosine.0[k] = volume.cosine;
-        self.sine.0[k] = volume.sine;
     }
 }
 

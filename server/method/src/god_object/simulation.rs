@@ -212,7 +212,6 @@ impl GodObject {
         let unconstrained = wish * part;
         let goal = advance_pose(&start, &unconstrained, 1.0);
 
-        // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
         let until_next =
             SET_PERIODS * self.way_beside_obstacles(&device, &last) + self.device_ahead;
         let mut update = Update {
@@ -225,23 +224,7 @@ impl GodObject {
             branch: angular(&unconstrained),
             step_memory: StepMemory::default(),
         };
-        report.unfinished = true;
-        while report.substeps < self.settings.max_substeps {
-            let budget_left = self
-                .settings
-                .work_budget
-                .is_none_or(|budget| report.work.nominal_us() < budget);
-            if !budget_left {
-                break;
-            }
-            report.substeps += 1;
-            let left = pose_difference(&goal, &self.pose_at_reference_point(), &update.branch);
-            update.branch = angular(&left);
-            if !self.substep(&left, &mut update, &mut report) {
-                report.unfinished = false;
-                break;
-            }
-        }
+        self.approach(&goal, &mut update, &mut report);
         let made = pose_difference(&self.pose_at_reference_point(), &start, &Vector3::zeros());
         if self.motion_length(&made) > self.settings.motion_tolerance {
             self.rest_memory.relax(&made, self.radius);
@@ -262,6 +245,27 @@ impl GodObject {
             .prepare(&self.world.body, &self.settings, Some(device_pose));
         self.describe_set(&mut report);
         report
+    }
+
+    /// Steps 3 to 5, repeated, until the body is at the goal or as near as obstacles let it: a budget that runs out is safe, the pose reached is valid.
+    fn approach(&mut self, goal: &Pose, update: &mut Update, report: &mut StepReport) {
+        report.unfinished = true;
+        while report.substeps < self.settings.max_substeps {
+            let budget_left = self
+                .settings
+                .work_budget
+                .is_none_or(|budget| report.work.nominal_us() < budget);
+            if !budget_left {
+                break;
+            }
+            report.substeps += 1;
+            let left = pose_difference(goal, &self.pose_at_reference_point(), &update.branch);
+            update.branch = angular(&left);
+            if !self.substep(&left, update, report) {
+                report.unfinished = false;
+                break;
+            }
+        }
     }
 
     pub(super) fn pose_at_reference_point(&self) -> Pose {

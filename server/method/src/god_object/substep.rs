@@ -131,8 +131,18 @@ impl GodObject {
         update.made += covered * time;
         update.branch -= angular(&constrained) * time;
 
-        // 5. Collect at the pose reached: what is published, unless that looks far ahead and another sub-step is likely. Most of the work is
-        // in what is near, and a set that serves the next sub-step alone is collected again when there is none.
+        self.collect_after(covered, update, report);
+        self.trust(
+            [covered, time],
+            [gap_before, known_within],
+            &mut update.step_memory,
+        );
+        true
+    }
+
+    /// Step 5: collects at the pose reached, what is published, unless that looks far ahead and another sub-step is likely. Most of the work is
+    /// in what is near, and a set that serves the next sub-step alone is collected again when there is none.
+    fn collect_after(&mut self, covered: f64, update: &Update, report: &mut StepReport) {
         let published = self.published_distance(update);
         let distance = if covered < self.settings.rest_distance {
             published
@@ -140,7 +150,16 @@ impl GodObject {
             published.min(self.settings.activation_distance)
         };
         self.collect(distance, &mut report.work);
+    }
 
+    /// Trusts the linear rows as far as the motion made shows: one that was to cover so much, m, and was free for a share of it. Before it the least gap and
+    /// the distance within which every pair was known were those, m.
+    fn trust(
+        &mut self,
+        [covered, time]: [f64; 2],
+        [gap_before, known_within]: [f64; 2],
+        memory: &mut StepMemory,
+    ) {
         // The linear rows foretell no gap below the rest distance that was not there before.
         let lost = gap_before - self.set.gap_min;
         let true_rows = lost <= LOST_GAP_SHARE * self.settings.rest_distance; // false for NaN
@@ -156,9 +175,8 @@ impl GodObject {
         }
         if time < TRUSTED_SHARE || !true_rows {
             // What comes next is a way out, and no turning back.
-            update.step_memory.last_motion = Vector6::zeros();
+            memory.last_motion = Vector6::zeros();
         }
-        true
     }
 
     /// Eq. (1) for as much of `left` as leads no farther than the constraints are trusted for; whether that is less than all. Where the rounds of
