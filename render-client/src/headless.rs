@@ -46,88 +46,161 @@ pub(crate) fn run(
         })?;
     }
     let start = Instant::now();
-    let mut next_frame = start;
-    let mut last_drawn = None;
-    let mut pacer = Pacer::new(session, plan.frame_time, plan.display_ns);
-    let mut show = plan.show;
+    let mut drawing = Drawing {
+        pacer: Pacer::new(session, plan.frame_time, plan.display_ns),
+        session,
+        canvas,
+        timeline,
+        statistics,
+        plan,
+        show: plan.show,
+        next_frame: start,
+        last_drawn: None,
+    };
     loop {
-        if session.interrupted() {
-            return Ok(Ended::Interrupted);
+        if let Some(ended) = drawing.keep_up()? {
+            return Ok(ended);
         }
-        match session.turn(timeline) {
-            Turn::Same => {}
-            Turn::Renewed(other) => {
-                statistics.renewed();
-                if let Some(scene) = other {
-                    canvas.restage(scene.0)?;
-                    show = scene.1;
-                }
-                pacer = Pacer::new(session, plan.frame_time, plan.display_ns);
-                last_drawn = None;
-            }
-            Turn::Told => return Ok(Ended::ServerStopped),
-            Turn::Lost(reason) => return Err(session.lost(reason)),
-        }
-        let link = session.health();
-        if plan
-            .duration
-            .is_some_and(|duration| start.elapsed() >= duration)
-        {
+        if plan.duration.is_some_and(|most| start.elapsed() >= most) {
             return Ok(Ended::Duration);
         }
-        if let Some(stats) = statistics.report(false) {
-            session.report(stats);
-        }
-
-        session.take_states(timeline);
-        let now_ns = session.now_ns();
-        let released =
-            now_ns.and_then(|now_ns| Some((now_ns, pacer.next(now_ns, timeline.newest_ns())?)));
-        if let Some((taken_ns, latched)) =
-            released.filter(|_| pacer.draws_at(next_frame, plan.frame_time))
-        {
-            canvas.set_status(pacer.complete(statistics.status(&plan.node, link)));
-            canvas.draw(&latched, show, plan.out.is_some())?;
-            pacer.wait();
-            let late = pacer.shown();
-            let shown_ns = session.now_ns().unwrap_or(taken_ns);
-            statistics.frame(&latched, taken_ns, shown_ns);
-            statistics.swap(late);
-            show_server(session, canvas, &latched);
-            tell(session, canvas);
-            if finish(canvas, statistics, plan)? {
-                return Ok(Ended::Frames);
-            }
-            last_drawn = None;
-            next_frame = (next_frame + plan.frame_time).max(Instant::now());
-            continue; // the barrier keeps the rhythm
-        }
-
-        // No barrier: each distinct state once, at this node's own rate.
-        let due = Instant::now() >= next_frame;
-        let latched = now_ns
-            .filter(|_| due)
-            .and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
-        if let Some((taken_ns, mut latched)) = latched {
-            let drawn = Some((latched.state.time_ns, latched.stale, shown(link)));
-            if drawn != last_drawn || session.is_picture_asked() {
-                last_drawn = drawn;
-                canvas.set_status(statistics.status(&plan.node, link));
-                // Off-screen a picture is looked at when it is done.
-                latched.state.head = timeline.head_at(taken_ns).or(latched.state.head);
-                canvas.draw(&latched, show, plan.out.is_some())?;
-                let drawn_ns = session.now_ns().unwrap_or(taken_ns);
-                statistics.frame(&latched, taken_ns, drawn_ns);
-                show_server(session, canvas, &latched);
-                tell(session, canvas);
-                if finish(canvas, statistics, plan)? {
-                    return Ok(Ended::Frames);
+        drawing.report();
+        let ended = match drawing.released() {
+            // The barrier keeps the rhythm.
+            Some((taken_ns, latched)) => drawing.draw_released(taken_ns, &latched)?,
+            None => {
+                let ended = drawing.draw_newest()?;
+                if ended.is_none() {
+                    drawing.rest();
                 }
+                ended
             }
-            // A late frame does not hurry the next ones.
-            next_frame = (next_frame + plan.frame_time).max(Instant::now());
+        };
+        if let Some(ended) = ended {
+            return Ok(ended);
         }
-        let left = next_frame.saturating_duration_since(Instant::now());
+    }
+}
+
+/// What tells a picture from the one before: the time of its state, ns, whether that is stale, and what is said of the link.
+type Drawn = (u64, bool, Option<u64>);
+
+/// Drawing under way.
+struct Drawing<'a> {
+    session: &'a mut Session,
+    canvas: &'a mut Canvas,
+    timeline: &'a mut Timeline,
+    statistics: &'a mut Statistics,
+    plan: &'a Plan,
+    show: Show,
+    pacer: Pacer,
+    next_frame: Instant,
+    last_drawn: Option<Drawn>,
+}
+
+impl Drawing<'_> {
+    /// Follows signals and the server; why drawing has ended, if it has.
+    fn keep_up(&mut self) -> Result<Option<Ended>, RenderError> {
+        if self.session.interrupted() {
+            return Ok(Some(Ended::Interrupted));
+        }
+        match self.session.turn(self.timeline) {
+            Turn::Same => Ok(None),
+            Turn::Renewed(other) => {
+                self.statistics.renewed();
+                if let Some(scene) = other {
+                    self.canvas.restage(scene.0)?;
+                    self.show = scene.1;
+                }
+                self.pacer = Pacer::new(self.session, self.plan.frame_time, self.plan.display_ns);
+                self.last_drawn = None;
+                Ok(None)
+            }
+            Turn::Told => Ok(Some(Ended::ServerStopped)),
+            Turn::Lost(reason) => Err(self.session.lost(reason)),
+        }
+    }
+
+    fn report(&mut self) {
+        if let Some(stats) = self.statistics.report(false) {
+            self.session.report(stats);
+        }
+    }
+
+    /// The state that the barrier released, if it is time, and when it was taken, ns.
+    fn released(&mut self) -> Option<(u64, Latched)> {
+        self.session.take_states(self.timeline);
+        let now_ns = self.session.now_ns()?;
+        let latched = self.pacer.next(now_ns, self.timeline.newest_ns())?;
+        let draws = self.pacer.draws_at(self.next_frame, self.plan.frame_time);
+        draws.then_some((now_ns, latched))
+    }
+
+    /// Draws a frame of the barrier; why drawing has ended, if it has.
+    fn draw_released(
+        &mut self,
+        taken_ns: u64,
+        latched: &Latched,
+    ) -> Result<Option<Ended>, RenderError> {
+        let link = self.session.health();
+        let status = self.statistics.status(&self.plan.node, link);
+        self.canvas.set_status(self.pacer.complete(status));
+        self.canvas
+            .draw(latched, self.show, self.plan.out.is_some())?;
+        self.pacer.wait();
+        let late = self.pacer.shown();
+        let shown_ns = self.session.now_ns().unwrap_or(taken_ns);
+        self.statistics.frame(latched, taken_ns, shown_ns);
+        self.statistics.swap(late);
+        self.last_drawn = None;
+        self.finish_frame(latched)
+    }
+
+    /// Without a barrier: each distinct state once, at this node's own rate. Why drawing has ended, if it has.
+    fn draw_newest(&mut self) -> Result<Option<Ended>, RenderError> {
+        let due = Instant::now() >= self.next_frame;
+        let Some(taken_ns) = self.session.now_ns().filter(|_| due) else {
+            return Ok(None);
+        };
+        let Some(mut latched) = self.timeline.latch(taken_ns) else {
+            return Ok(None);
+        };
+        let link = self.session.health();
+        let drawn = Some((latched.state.time_ns, latched.stale, shown(link)));
+        if drawn == self.last_drawn && !self.session.is_picture_asked() {
+            self.schedule();
+            return Ok(None);
+        }
+        self.last_drawn = drawn;
+        let status = self.statistics.status(&self.plan.node, link);
+        self.canvas.set_status(status);
+        // Off-screen a picture is looked at when it is done.
+        latched.state.head = self.timeline.head_at(taken_ns).or(latched.state.head);
+        self.canvas
+            .draw(&latched, self.show, self.plan.out.is_some())?;
+        let drawn_ns = self.session.now_ns().unwrap_or(taken_ns);
+        self.statistics.frame(&latched, taken_ns, drawn_ns);
+        self.finish_frame(&latched)
+    }
+
+    /// Hands on what is drawn; why drawing has ended, if it has.
+    fn finish_frame(&mut self, latched: &Latched) -> Result<Option<Ended>, RenderError> {
+        show_server(self.session, self.canvas, latched);
+        tell(self.session, self.canvas);
+        if finish(self.canvas, self.statistics, self.plan)? {
+            return Ok(Some(Ended::Frames));
+        }
+        self.schedule();
+        Ok(None)
+    }
+
+    /// A late frame does not hurry the next ones.
+    fn schedule(&mut self) {
+        self.next_frame = (self.next_frame + self.plan.frame_time).max(Instant::now());
+    }
+
+    fn rest(&self) {
+        let left = self.next_frame.saturating_duration_since(Instant::now());
         // Nothing to draw yet: look again soon, but not at once.
         let rest = if left.is_zero() {
             Duration::from_millis(2)

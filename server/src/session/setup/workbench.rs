@@ -95,27 +95,7 @@ pub fn session_setup(
     }
     let workbench_from_scene = workbench.workbench_from_scene(&scene);
     let content = content(&built, workbench, &workbench_from_scene)?;
-    let network = &workbench.network;
-    let link = LinkSettings {
-        quic: overrides
-            .quic
-            .unwrap_or(SocketAddr::new(network.bind, network.quic_port)),
-        udp: overrides
-            .udp
-            .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
-        announced_udp_port: None,
-        key,
-        also: also_key(network)?,
-        multicast: (network.transport == TransportKind::Multicast).then_some(MulticastOptions {
-            group: network.multicast_group,
-            announced: None,
-            interface: network.multicast_interface,
-        }),
-        policy: network.admission.clone(),
-        max_clients: network.max_clients,
-        frames: frames::settings(&workbench.frames),
-        node_timeout: Duration::from_secs_f64(network.node_timeout),
-    };
+    let link = link(workbench, key, overrides)?;
     let safety = safety(
         workbench,
         choice.as_ref(),
@@ -173,6 +153,35 @@ pub fn session_setup(
         operator: OperatorSetup::of(workbench)?,
         realtime,
         monitor: monitor(&workbench.monitoring, overrides)?,
+    })
+}
+
+/// Addresses and conditions of the network.
+fn link(
+    workbench: &Workbench,
+    key: ClusterKey,
+    overrides: &Overrides,
+) -> Result<LinkSettings, Failure> {
+    let network = &workbench.network;
+    Ok(LinkSettings {
+        quic: overrides
+            .quic
+            .unwrap_or(SocketAddr::new(network.bind, network.quic_port)),
+        udp: overrides
+            .udp
+            .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
+        announced_udp_port: None,
+        key,
+        also: also_key(network)?,
+        multicast: (network.transport == TransportKind::Multicast).then_some(MulticastOptions {
+            group: network.multicast_group,
+            announced: None,
+            interface: network.multicast_interface,
+        }),
+        policy: network.admission.clone(),
+        max_clients: network.max_clients,
+        frames: frames::settings(&workbench.frames),
+        node_timeout: Duration::from_secs_f64(network.node_timeout),
     })
 }
 
