@@ -41,6 +41,154 @@ fn faults() -> impl Strategy<Value = Vec<(Fault, u64, f64)>> {
     prop::collection::vec((fault, 1_u64..200, -30.0..30.0_f64), 1..12)
 }
 
+/// A fault while it lasts.
+struct Spell {
+    fault: Fault,
+    begun: Duration,
+    newtons: f64,
+    /// There was a fault of the device before it, or from its first tick on.
+    after_fault: bool,
+}
+
+/// What holds of the force, N, or the torque, N m.
+#[derive(Clone, Copy)]
+struct Bounds {
+    most: f64,
+    /// What a write may change unexplained, and by what the motion explains.
+    own: f64,
+    explained: f64,
+}
+
+/// A port and what its inputs were.
+struct Trial {
+    stage: Stage,
+    /// Of the set that each command comes from.
+    age: Duration,
+    bounds: [Bounds; 2],
+    /// When the newest good sample came, and what the newest good command comes from.
+    good_sample: Duration,
+    good_command: Duration,
+    before: Vector6<f64>,
+    last_pose: Option<Pose>,
+    /// For how long the pose has been the same.
+    stood: Duration,
+}
+
+impl Trial {
+    fn new(settings: SafetySettings, speed: f64, age: Duration) -> Self {
+        let mut stage = Stage::new(settings);
+        stage.speed = speed;
+        let _ = stage.good(force(5.0));
+        stage.port.ask_to_arm();
+        stage.good_for(ms(600), force(5.0));
+        let period = settings.period.as_secs_f64();
+        let bounds = [(20.0, 500.0, 1000.0), (0.5, 50.0, 100.0)].map(|(most, rate, stiffness)| {
+            let own = rate * period.min(0.002);
+            let explained = (1.5 * stiffness * speed * period).min(4.0 * own);
+            Bounds {
+                most,
+                own,
+                explained,
+            }
+        });
+        Self {
+            age,
+            bounds,
+            good_sample: stage.now,
+            good_command: stage.now,
+            before: *stage.port.rendered(),
+            last_pose: Some(sample_at(stage.now, speed).pose),
+            stood: Duration::ZERO,
+            stage,
+        }
+    }
+
+    /// What comes next from the device and from whoever commands.
+    fn inputs(&mut self, spell: &Spell) -> (Answer, Command) {
+        let (now, speed) = (self.stage.now + self.stage.period, self.stage.speed);
+        let mut sample = sample_at(now, speed);
+        let wrench = Vector6::new(spell.newtons, 3.0, 0.0, 0.0, 0.3, 0.0);
+        let mut command = Command::on_set(now - self.age, wrench);
+        match spell.fault {
+            Fault::Origin => sample.pose = Pose::identity(),
+            Fault::Frozen => sample.pose = sample_at(spell.begun, speed).pose,
+            Fault::Nan => sample.pose = Pose::translation(f64::NAN, 0.0, 0.0),
+            Fault::Jump => sample.pose = Pose::translation(9.0, 0.0, 0.0),
+            Fault::TimeBack => sample.time -= ms(300),
+            Fault::Unplugged => {
+                let age = now - spell.begun;
+                return (Err(DeviceFault::Lost { age }), command);
+            }
+            Fault::WrenchNan => command.wrench[3] = f64::NAN,
+            Fault::CommandsStop => command.origin = self.good_command,
+            Fault::ConstraintsStop => command.constraint_age = now - spell.begun,
+            Fault::CommandsAhead => command.origin = now + ms(50),
+            Fault::Paused => command.paused = true,
+            Fault::Disarm => self.stage.port.ask_to_disarm(),
+            Fault::None => {}
+        }
+        (Ok(sample), command)
+    }
+
+    /// Whether the port has to take this pose.
+    fn is_good(&mut self, pose: Option<Pose>, spell: &Spell) -> bool {
+        let moved = pose != self.last_pose;
+        self.last_pose = pose;
+        self.stood += self.stage.period;
+        if moved {
+            self.stood = Duration::ZERO;
+        }
+        match spell.fault {
+            // A device that has stood somewhere else for long enough is there.
+            Fault::Origin | Fault::Jump => self.stood > ms(100),
+            // It froze when it moved last. One that stands still after another fault rests: where it froze before, it comes back somewhere else.
+            Fault::Frozen => moved || spell.after_fault && self.stage.now > spell.begun + ms(100),
+            Fault::Nan | Fault::TimeBack | Fault::Unplugged => false,
+            _ => true,
+        }
+    }
+
+    fn tick(&mut self, spell: &mut Spell) -> Result<(), TestCaseError> {
+        let (answer, command) = self.inputs(spell);
+        let sample_is_good = self.is_good(answer.map(|sample| sample.pose).ok(), spell);
+        let is_first = self.stage.now == spell.begun;
+        let report = self.stage.tick(answer, Some(command));
+        spell.after_fault |= is_first && self.stage.port.fault().is_some();
+        if sample_is_good {
+            self.good_sample = self.stage.now;
+        }
+        match spell.fault {
+            Fault::WrenchNan | Fault::CommandsStop | Fault::CommandsAhead => {}
+            _ => self.good_command = self.stage.now - self.age,
+        }
+        self.assert_promises(&report, spell)
+    }
+
+    fn assert_promises(&mut self, report: &TickReport, spell: &Spell) -> Result<(), TestCaseError> {
+        let felt = report.wrench;
+        prop_assert!(felt.iter().all(|x| x.is_finite()));
+        for (start, bounds) in [0, 3].into_iter().zip(self.bounds) {
+            let part = |wrench: Vector6<f64>| wrench.fixed_rows::<3>(start).norm();
+            prop_assert!(part(felt) <= bounds.most * (1.0 + 1e-12));
+            // Motion explains nothing of a force that comes, is held or goes away.
+            let armed = report.state == ArmingState::Armed;
+            let most = bounds.own + if armed { bounds.explained } else { 0.0 };
+            prop_assert!(part(felt - self.before) <= most * (1.0 + 1e-9));
+        }
+        let (fault, now) = (spell.fault, self.stage.now);
+        let silent = now - self.good_sample.min(self.good_command);
+        if silent >= SafetySettings::ZERO_AFTER {
+            prop_assert_eq!(felt, Vector6::zeros(), "{:?} for {:?}", fault, silent);
+        }
+        let wished = matches!(fault, Fault::Paused | Fault::Disarm);
+        if wished && now - spell.begun >= SafetySettings::ZERO_AFTER {
+            prop_assert_eq!(felt, Vector6::zeros(), "{:?}", fault);
+        }
+        self.before = felt;
+        Ok(())
+    }
+}
+
 proptest! {
     #[test]
     fn whatever_goes_wrong_the_force_changes_slowly_and_is_gone_in_time(
@@ -56,102 +204,15 @@ proptest! {
             rearm: if automatic { Rearm::Automatic } else { Rearm::Manual },
             ..SafetySettings::default()
         };
-        let mut stage = Stage::new(settings);
-        stage.speed = speed;
-        let sample = |now| sample_at(now, speed);
-        let _ = stage.good(force(5.0));
-        stage.port.ask_to_arm();
-        stage.good_for(ms(600), force(5.0));
-        // What a write may change: unexplained, and what the motion explains; N and N m.
-        let period = settings.period.as_secs_f64();
-        let (own, own_torque) = (500.0 * period.min(0.002), 50.0 * period.min(0.002));
-        let explained = (1.5 * 1000.0 * speed * period).min(4.0 * own);
-        let explained_torque = (1.5 * 100.0 * speed * period).min(4.0 * own_torque);
-        // When the newest good sample came, and what the newest good command comes from.
-        let age = ms(age_ms);
-        let (mut good_sample, mut good_command) = (stage.now, stage.now);
-        let mut before = *stage.port.rendered();
-        let mut last_pose = Some(sample(stage.now).pose);
-        // For how long the pose has been the same.
-        let mut stood = Duration::ZERO;
+        let mut trial = Trial::new(settings, speed, ms(age_ms));
         let mut after_fault = false;
         for (fault, duration_ms, newtons) in sequence {
-            let begun = stage.now;
-            let mut jumped = false;
-            let mut is_first = true;
-            while stage.now < begun + ms(duration_ms) {
-                let now = stage.now + settings.period;
-                let mut answer = Ok(sample(now));
-                let mut command = Command::on_set(now - age, Vector6::new(newtons, 3.0, 0.0, 0.0, 0.3, 0.0));
-                let (mut sample_is_good, mut command_is_good) = (true, true);
-                match fault {
-                    Fault::Origin => answer = Ok(DeviceSample { pose: Pose::identity(), ..sample(now) }),
-                    Fault::Frozen => answer = Ok(DeviceSample { time: now, ..sample(begun) }),
-                    Fault::Nan => answer = Ok(DeviceSample { pose: Pose::translation(f64::NAN, 0.0, 0.0), ..sample(now) }),
-                    Fault::Jump => answer = Ok(DeviceSample { pose: Pose::translation(9.0, 0.0, 0.0), ..sample(now) }),
-                    Fault::TimeBack => answer = Ok(DeviceSample { time: now - ms(300), ..sample(now) }),
-                    Fault::Unplugged => answer = Err(DeviceFault::Lost { age: now - begun }),
-                    Fault::WrenchNan => command.wrench[3] = f64::NAN,
-                    Fault::CommandsStop => command.origin = good_command,
-                    Fault::ConstraintsStop => command.constraint_age = now - begun,
-                    Fault::CommandsAhead => command.origin = now + ms(50),
-                    Fault::Paused => command.paused = true,
-                    Fault::Disarm => stage.port.ask_to_disarm(),
-                    Fault::None => {}
-                }
-                if matches!(fault, Fault::Origin | Fault::Frozen | Fault::Nan | Fault::Jump | Fault::TimeBack | Fault::Unplugged) {
-                    sample_is_good = false;
-                }
-                if matches!(fault, Fault::WrenchNan | Fault::CommandsStop | Fault::CommandsAhead) {
-                    command_is_good = false;
-                }
-                let pose = answer.map(|sample| sample.pose).ok();
-                stood = if pose == last_pose { stood + settings.period } else { Duration::ZERO };
-                // A device that has stood somewhere else for long enough is there, and one that stands still after another fault rests: where it froze
-                // before, it comes back somewhere else.
-                let stands = match fault {
-                    Fault::Origin | Fault::Jump => stood > ms(100),
-                    Fault::Frozen => (after_fault || jumped) && stage.now > begun + ms(100),
-                    _ => false,
-                };
-                if stands {
-                    sample_is_good = true;
-                }
-                // What stands still froze when it moved last.
-                if matches!(fault, Fault::Frozen) && pose != last_pose {
-                    sample_is_good = true;
-                }
-                last_pose = pose;
-                let report = stage.tick(answer, Some(command));
-                jumped |= is_first && stage.port.fault().is_some();
-                is_first = false;
-                if sample_is_good {
-                    good_sample = stage.now;
-                }
-                if command_is_good {
-                    good_command = stage.now - age;
-                }
-                let felt = report.wrench;
-                prop_assert!(felt.iter().all(|x| x.is_finite()));
-                let part = |wrench: &Vector6<f64>, start: usize| wrench.fixed_rows::<3>(start).norm();
-                prop_assert!(part(&felt, 0) <= 20.0 * (1.0 + 1e-12));
-                prop_assert!(part(&felt, 3) <= 0.5 * (1.0 + 1e-12));
-                // Motion explains nothing of a force that comes, is held or goes away.
-                let answers = report.state == ArmingState::Armed;
-                let (more, more_torque) = if answers { (explained, explained_torque) } else { (0.0, 0.0) };
-                prop_assert!(part(&(felt - before), 0) <= (own + more) * (1.0 + 1e-9));
-                prop_assert!(part(&(felt - before), 3) <= (own_torque + more_torque) * (1.0 + 1e-9));
-                let silent = stage.now - good_sample.min(good_command);
-                if silent >= SafetySettings::ZERO_AFTER {
-                    prop_assert_eq!(felt, Vector6::zeros(), "{:?} for {:?}", fault, silent);
-                }
-                let wished = matches!(fault, Fault::Paused | Fault::Disarm);
-                if wished && stage.now - begun >= SafetySettings::ZERO_AFTER {
-                    prop_assert_eq!(felt, Vector6::zeros(), "{:?}", fault);
-                }
-                before = felt;
+            let begun = trial.stage.now;
+            let mut spell = Spell { fault, begun, newtons, after_fault };
+            while trial.stage.now < begun + ms(duration_ms) {
+                trial.tick(&mut spell)?;
             }
-            after_fault = stage.port.fault().is_some();
+            after_fault = trial.stage.port.fault().is_some();
         }
     }
 }
