@@ -7,16 +7,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crate::support::{PATIENCE, shipped_workbench};
+use crate::support::{PATIENCE, shipped_workbench, start_behind_relay, start_bridge};
 use taut::report::terminal::Terminal;
-use taut::session::Session;
 use taut::session::setup::DeviceSource;
 use taut::session::setup::workbench::{Overrides, session_setup};
-use taut_bridge::{BridgeArgs, BridgeReport, DeviceLimits, MAX_EDGE_DELAY};
+use taut_bridge::{BridgeReport, DeviceLimits, MAX_EDGE_DELAY};
 use taut_link::{ClientOptions, Role, connect, create_key_file};
 use taut_proto::state::RunState;
 use taut_test_kit::BALL_ON_FLOOR;
-use taut_test_kit::relay::{Direction, Impairment, Treatment, Waiting};
+use taut_test_kit::relay::{Direction, Impairment};
 
 const STIFFNESS: f64 = 1000.0;
 const RADIUS: f64 = 0.02;
@@ -69,46 +68,20 @@ fn run(coupling: &str) -> Run {
         limits: DeviceLimits::UNLIMITED,
         max_age: MAX_EDGE_DELAY,
     };
-    let waiting = Waiting::bind().expect("a port");
-    setup.link.announced_udp_port = Some(waiting.address().port());
-    let mut session = Session::start(setup).unwrap_or_else(|error| panic!("{error}"));
-    let (quic, udp) = (session.quic_address(), session.udp_address());
-    let (quic, udp) = (quic.expect("listens"), udp.expect("listens"));
     let impairment = Impairment {
         lost: 0.05,
         delay: Duration::from_millis(20),
         ..Impairment::default()
     };
-    let treatments = vec![Treatment::both_ways(impairment)];
-    let relay = waiting.start(udp, treatments, 7).expect("a relay");
+    let (mut session, relay) = start_behind_relay(setup, impairment);
 
     let (canary, awake) = canary();
-    let server = quic.to_string();
-    let words = [
-        "bridge",
-        "--server",
-        &server,
-        "--key",
-        key_path.to_str().expect("a plain path"),
-        "--priority",
-        "0",
-        "--hand",
-        "firm",
-        "--path",
-        path.to_str().expect("a plain path"),
-        "--duration",
-        &DURATION_S.to_string(),
-        "--coupling",
-        coupling,
-        // What is looked at is the force of the coupling alone.
-        "--passivity",
-        "observe",
-    ];
-    let args = BridgeArgs::of_words(words).expect("valid");
-    let bridge = std::thread::Builder::new()
-        .name("bridge".to_owned())
-        .spawn(move || taut_bridge::run(&args))
-        .expect("a thread");
+    let server = session.quic_address().expect("listens").to_string();
+    let duration = DURATION_S.to_string();
+    // What is looked at is the force of the coupling alone.
+    let more = ["--coupling", coupling, "--passivity", "observe"];
+    let more = [&more[..], &["--duration", &duration]].concat();
+    let bridge = start_bridge(&server, &key_path, &path, &more);
     let (errors, interrupted) = observe(&server, &key_path, || bridge.is_finished());
     let report = bridge
         .join()

@@ -16,6 +16,9 @@ use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
 use crate::support::{PATIENCE, Workplace, command};
 
+/// A path far above the plane.
+pub(crate) const STILL: &str = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.2,1,0,0,0\n1,0,0,0.2,1,0,0,0\n";
+
 fn overrides() -> Vec<String> {
     [
         "network.quic_port=0",
@@ -37,12 +40,11 @@ fn workbench(more: &[&str]) -> Result<Workbench, String> {
         .map_err(|error| error.to_string())
 }
 
-/// A session whose simulated hand stands still far above the plane.
+/// A session whose simulated hand goes on [`STILL`].
 fn session(key: &ClusterKey, more: &[&str]) -> (Session, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
     let path = folder.path().join("still.csv");
-    let still = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.2,1,0,0,0\n1,0,0,0.2,1,0,0,0\n";
-    assert!(std::fs::write(&path, still).is_ok());
+    assert!(std::fs::write(&path, STILL).is_ok());
     let path = format!("device.path={:?}", path.display().to_string());
     let wanted = [&["device.hand=\"firm\"", path.as_str()], more].concat();
     let workbench = workbench(&wanted).unwrap_or_else(|error| panic!("{error}"));
@@ -263,49 +265,67 @@ fn a_sensor_writes_lines_and_one_that_is_no_wrench_ends_the_sender_by_name() {
     end(session);
 }
 
+/// Waits until the session has refused or dropped a value of each of these kinds. Each is sent beside a good one, so that it would be felt.
+async fn send_wrong_ones(session: &Session, link: &ClientLink, index: &mut u64) {
+    let wrong: [&dyn Fn(&mut ForceSample); 4] = [
+        &|sample| sample.index = 7,
+        &|sample| sample.sample_time_ns -= 500_000_000,
+        &|sample| sample.sample_time_ns += 500_000_000,
+        &|sample| sample.sample_time_ns = 0,
+    ];
+    let seen = || {
+        let report = session.metrics().session.external_wrench;
+        report.map_or(0, |report| {
+            report.dropped + report.refused.values().sum::<u64>()
+        })
+    };
+    for bend in wrong {
+        let before = seen();
+        until("a refusal", || {
+            *index += 2;
+            link.send_force(&sample(link, *index, 1.0));
+            let mut bent = sample(link, *index + 1, -4.0);
+            bend(&mut bent);
+            link.send_force(&bent);
+            seen() > before
+        })
+        .await;
+    }
+}
+
+/// Who has the place keeps it, others of the role stay outside, and another role may not.
+async fn assert_alone(session: &Session, key: &ClusterKey, index: &mut u64) {
+    let server = address(session);
+    match join(key, Role::Force, "another", &server).await {
+        Err(LinkError::Refused { code, .. }) => assert_eq!(code, RefusalCode::ForceTaken),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("let in"),
+    }
+    let operator = join(key, Role::Operator, "somebody", &server).await;
+    let operator = operator.unwrap_or_else(|error| panic!("{error}"));
+    until("a clock", || operator.session_now().is_some()).await;
+    until("a refusal", || {
+        *index += 1;
+        operator.send_force(&sample(&operator, *index, -4.0));
+        session.metrics().network["forbidden"] > 0
+    })
+    .await;
+}
+
 #[test]
-fn old_repeated_overtaken_and_future_values_and_a_flood_give_no_other_force() {
+fn old_repeated_overtaken_future_and_flooding_values_give_no_other_force() {
     let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
     let (session, folder) = session(&key, &[]);
-    let server = address(&session);
     runtime().block_on(async {
-        let link = join(&key, Role::Force, "robot", &server).await;
+        let link = join(&key, Role::Force, "robot", &address(&session)).await;
         let link = link.unwrap_or_else(|error| panic!("{error}"));
         // Half a second ago is a time of this session, too.
         until("a clock", || {
             link.session_now().is_some_and(|now| now.ns > 600_000_000)
         })
         .await;
-        let report = || {
-            session
-                .metrics()
-                .session
-                .external_wrench
-                .unwrap_or_default()
-        };
         let mut index = 1_000;
-        // Each beside a good one, so that a wrong one would be felt.
-        let wrong: [&dyn Fn(&mut ForceSample); 4] = [
-            &|sample| sample.index = 7,
-            &|sample| sample.sample_time_ns -= 500_000_000,
-            &|sample| sample.sample_time_ns += 500_000_000,
-            &|sample| sample.sample_time_ns = 0,
-        ];
-        for bend in wrong {
-            let before = report();
-            let seen = |report: &taut::report::external::ExternalWrenchReport| {
-                report.dropped + report.refused.values().sum::<u64>()
-            };
-            until("a refusal", || {
-                index += 2;
-                link.send_force(&sample(&link, index, 1.0));
-                let mut bent = sample(&link, index + 1, -4.0);
-                bend(&mut bent);
-                link.send_force(&bent);
-                seen(&report()) > seen(&before)
-            })
-            .await;
-        }
+        send_wrong_ones(&session, &link, &mut index).await;
         // 10 kHz and more, as fast as it goes: cut to the role's rate, and felt as one.
         until("a flood that is cut", || {
             for _ in 0..200 {
@@ -315,22 +335,7 @@ fn old_repeated_overtaken_and_future_values_and_a_flood_give_no_other_force() {
             session.metrics().network["flooded"] > 0
         })
         .await;
-        // Who has the place keeps it, and others of the role stay outside.
-        match join(&key, Role::Force, "another", &server).await {
-            Err(LinkError::Refused { code, .. }) => assert_eq!(code, RefusalCode::ForceTaken),
-            Err(other) => panic!("{other}"),
-            Ok(_) => panic!("let in"),
-        }
-        // Another role may not.
-        let operator = join(&key, Role::Operator, "somebody", &server).await;
-        let operator = operator.unwrap_or_else(|error| panic!("{error}"));
-        until("a clock", || operator.session_now().is_some()).await;
-        until("a refusal", || {
-            index += 1;
-            operator.send_force(&sample(&operator, index, -4.0));
-            session.metrics().network["forbidden"] > 0
-        })
-        .await;
+        assert_alone(&session, &key, &mut index).await;
     });
     end(session);
     let felt = felt(folder.path());

@@ -1,17 +1,17 @@
 //! A force from outside for a device behind a bridge: source, server and bridge, with a network between that delays.
 
-use std::path::Path;
+use std::process::Child;
 use std::time::{Duration, Instant};
 
 use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
-use taut_bridge::{BridgeArgs, BridgeReport};
+use taut_bridge::BridgeReport;
 use taut_link::create_key_file;
-use taut_test_kit::relay::{Impairment, Treatment, Waiting};
+use taut_test_kit::relay::Impairment;
 
-use crate::support::{PATIENCE, shipped_workbench};
-use crate::wrench_in::{felt, sender};
+use crate::support::{PATIENCE, shipped_workbench, start_behind_relay, start_bridge};
+use crate::wrench_in::{STILL, felt, sender};
 
 /// What the hand of a bridge felt along x, N, tick by tick, of a source of 1 N that is killed once it was felt for a second; source and bridge are `delay_us`
 /// away from the server, each.
@@ -19,8 +19,7 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
     let folder = tempfile::tempdir().expect("a folder");
     let (key_path, path) = (folder.path().join("key"), folder.path().join("still.csv"));
     let key = create_key_file(&key_path).expect("a key");
-    let still = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.2,1,0,0,0\n1,0,0,0.2,1,0,0,0\n";
-    std::fs::write(&path, still).expect("a file");
+    std::fs::write(&path, STILL).expect("a file");
     let wanted = [
         "scene=\"sphere-on-plane\"",
         "device={kind=\"remote\"}",
@@ -29,40 +28,19 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
         "safety.rearm=\"automatic\"",
         "network.node_timeout=20.0",
     ];
-    let workbench = shipped_workbench(&wanted);
     let overrides = Overrides {
         no_monitor: true,
         recording: Some(folder.path().join("session")),
         ..Overrides::default()
     };
-    let mut setup = session_setup(&workbench, key, &overrides).expect("a session");
-    let waiting = Waiting::bind().expect("a port");
-    setup.link.announced_udp_port = Some(waiting.address().port());
-    let session = Session::start(setup).unwrap_or_else(|error| panic!("{error}"));
-    let (quic, udp) = (session.quic_address(), session.udp_address());
+    let setup = session_setup(&shipped_workbench(&wanted), key, &overrides).expect("a session");
     let impairment = Impairment {
         delay: Duration::from_micros(delay_us),
         ..Impairment::default()
     };
-    let treatments = vec![Treatment::both_ways(impairment)];
-    let _relay = waiting
-        .start(udp.expect("listens"), treatments, 7)
-        .expect("a relay");
-    let server = quic.expect("listens").to_string();
-    let word = |path: &Path| path.display().to_string();
-    let (key, path) = (word(&key_path), word(&path));
-    let words = [
-        "bridge",
-        "--server",
-        &server,
-        "--key",
-        &key,
-        "--priority",
-        "0",
-        "--hand",
-        "firm",
-        "--path",
-        &path,
+    let (session, _relay) = start_behind_relay(setup, impairment);
+    let server = session.quic_address().expect("listens").to_string();
+    let more = [
         "--coupling",
         coupling,
         "--passivity",
@@ -70,11 +48,18 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
         "--give-up",
         "20",
     ];
-    let args = BridgeArgs::of_words(words).expect("valid");
-    let bridge = std::thread::Builder::new()
-        .spawn(move || taut_bridge::run(&args))
-        .expect("a thread");
-    let mut source = sender(&server, &key_path, &["--wrench", "1,0,0,0,0,0"]);
+    let bridge = start_bridge(&server, &key_path, &path, &more);
+    let source = sender(&server, &key_path, &["--wrench", "1,0,0,0,0,0"]);
+    feel_and_kill(&session, source, passivity == "control");
+    let (_, failure) = session.stop(&Terminal::standard_error());
+    assert!(failure.is_none());
+    let report = bridge.join().expect("no panic").expect("a whole run");
+    let felt = felt(folder.path());
+    (felt.into_iter().map(|one| one.force).collect(), report)
+}
+
+/// Kills the source after a second of its force, which is `felt` if the bridge keeps the energy, and waits for another second.
+fn feel_and_kill(session: &Session, mut source: Child, felt: bool) {
     let begun = Instant::now();
     let report = || {
         std::thread::sleep(Duration::from_millis(20));
@@ -83,7 +68,7 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
         report
     };
     while report().external_wrench.is_none_or(|of| of.taken < 1000) {}
-    if passivity == "control" {
+    if felt {
         while report().largest_force_n < 0.1 {}
     }
     let ticks = report().haptics_period_us.count;
@@ -91,11 +76,6 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
     assert!(source.kill().is_ok() && source.wait().is_ok());
     let ticks = report().haptics_period_us.count;
     while report().haptics_period_us.count < ticks + 1000 {}
-    let (_, failure) = session.stop(&Terminal::standard_error());
-    assert!(failure.is_none());
-    let report = bridge.join().expect("no panic").expect("a whole run");
-    let felt = felt(folder.path());
-    (felt.into_iter().map(|one| one.force).collect(), report)
 }
 
 /// The largest, and that of the last 100 ticks.
