@@ -9,7 +9,7 @@ use taut::loops::wiring::WiredLoops;
 use taut::session::setup::DeviceSource;
 use taut::session::setup::devices::device;
 use taut_bridge::{EventKind, SafetySettings};
-use taut_recording::{FORMAT, Lost, Manifest, Recorder, SceneOrigin};
+use taut_recording::{FORMAT, Lost, Manifest, Recorder, SceneOrigin, Taps};
 use taut_scene::{Device, Scene};
 
 fn manifest() -> Manifest {
@@ -27,6 +27,36 @@ fn manifest() -> Manifest {
     }
 }
 
+/// The loops of a scene with a simulated device, pulled by these strings.
+fn wired(name: &str, strings: Option<&str>, taps: Taps) -> WiredLoops {
+    let scene = Scene::named_or_file(name)
+        .and_then(|scene| scene.build())
+        .unwrap_or_else(|error| panic!("{error}"));
+    let wanted = Device::Simulated {
+        hand: None,
+        path: None,
+        tremor: 5e-5,
+        seed: 1,
+        strings: strings.map(str::to_owned),
+    };
+    let Ok(DeviceSource::Local(device)) = device(&wanted, &scene, &Pose::identity()) else {
+        panic!("no simulated device");
+    };
+    let world = Arc::new(scene.world);
+    let Ok(god_object) = GodObject::new(world.clone(), scene.settings, scene.start) else {
+        panic!("{name} starts in penetration");
+    };
+    WiredLoops::new(
+        &world,
+        &scene.settings,
+        god_object,
+        device,
+        SafetySettings::default(),
+        Some(taps),
+    )
+    .with_motions(scene.motions)
+}
+
 #[test]
 fn loops_two_and_three_allocate_nothing() {
     for (name, strings) in [
@@ -36,36 +66,11 @@ fn loops_two_and_three_allocate_nothing() {
         ("sphere-on-plane", Some("g6x3r")),
         ("peg-in-a-hole", Some("wb")),
     ] {
-        let scene = Scene::named_or_file(name)
-            .and_then(|scene| scene.build())
-            .unwrap_or_else(|error| panic!("{error}"));
-        let wanted = Device::Simulated {
-            hand: None,
-            path: None,
-            tremor: 5e-5,
-            seed: 1,
-            strings: strings.map(str::to_owned),
-        };
-        let Ok(DeviceSource::Local(device)) = device(&wanted, &scene, &Pose::identity()) else {
-            panic!("no simulated device");
-        };
-        let world = Arc::new(scene.world);
-        let Ok(god_object) = GodObject::new(world.clone(), scene.settings, scene.start) else {
-            panic!("{name} starts in penetration");
-        };
         // Recorded, too.
         let directory = tempfile::tempdir().expect("no temporary directory");
         let (taps, _recorder) =
             Recorder::start(directory.path(), manifest(), "").expect("cannot record");
-        let mut loops = WiredLoops::new(
-            &world,
-            &scene.settings,
-            god_object,
-            device,
-            SafetySettings::default(),
-            Some(taps),
-        )
-        .with_motions(scene.motions);
+        let mut loops = wired(name, strings, taps);
         let mut most_contacts = 0;
         for tick in 1..=4000_u64 {
             let now = Duration::from_millis(tick);
@@ -74,16 +79,8 @@ fn loops_two_and_three_allocate_nothing() {
                 loops.coupling.tick(now);
             });
             loops.god_object.tick(|| now);
-            most_contacts = most_contacts.max(
-                loops
-                    .readers
-                    .monitor
-                    .contacts
-                    .newest()
-                    .set
-                    .constraints
-                    .len(),
-            );
+            let contacts = loops.readers.monitor.contacts.newest();
+            most_contacts = most_contacts.max(contacts.set.constraints.len());
         }
         assert!(most_contacts > 0, "{name}: nothing was touched");
         let faults = loops

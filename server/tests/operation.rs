@@ -29,95 +29,74 @@ fn get(address: &str, target: &str, headers: &str) -> String {
     answer
 }
 
-#[test]
-fn what_strangers_and_clients_write_is_shown_harmless_and_audited_and_metrics_are_served() {
-    let (place, shipped) = (Workplace::new(), workbench());
+/// The shipped workbench with observers on a free port.
+fn with_observers() -> String {
+    let shipped = workbench();
     let (before, observers) = shipped.split_once("[observers]").expect("a table");
     let observers = observers
         .replacen("enabled = false", "enabled = true", 1)
         .replacen("port = 4860", "port = 0", 1);
-    place.write("workbench.toml", &format!("{before}[observers]{observers}"));
-    let lines = place.text("metrics.jsonl");
-    let server = serve(
-        &place,
-        &["--metrics-json", &lines, "--metrics-period", "0.2"],
-        &[],
-    );
+    format!("{before}[observers]{observers}")
+}
+
+/// A stranger with a hostile name, a member with one, and an operator who logs [`HOSTILE`] and disarms.
+async fn knock(server: &Running, key: ClusterKey) {
     let quic = server.word_after("serving on ");
-    let page = server.word_after("observers: http://");
-    let page = page.trim_end_matches(['/', ',']).to_owned();
+    let join = |key: JoinKey, role, node: &str| {
+        connect(ClientOptions {
+            connect_timeout: PATIENCE,
+            ..ClientOptions::new(quic.as_str(), key, role, node)
+        })
+    };
+    let stranger = ClusterKey::generate().expect("random");
+    // Not of this workbench: the name comes unproven. Its pin would stop it before: it takes the server for its own.
+    let _ = join(stranger.into(), Role::Operator, HOSTILE).await;
+    // Rightly inside, with a name that is none.
+    let refused = join(key.clone().into(), Role::Operator, HOSTILE).await;
+    assert!(refused.is_err_and(|error| error.to_string().contains("printable")));
+    let operator = join(key.into(), Role::Operator, "alice").await.expect("in");
+    assert!(operator.post_log(LogLevel::Error, format!("log {HOSTILE}")));
+    assert!(operator.post_arm(false));
+    wait_until("the disarming is told", || server.says("event=\"disarm\""));
+    operator.close().await;
+}
 
-    let key = read_key_file(&place.path("cluster.key")).expect("the key");
-    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
-    runtime.block_on(async {
-        let join = |key: JoinKey, role, node: &str| {
-            connect(ClientOptions {
-                connect_timeout: PATIENCE,
-                ..ClientOptions::new(quic.as_str(), key, role, node)
-            })
-        };
-        let stranger = ClusterKey::generate().expect("random");
-        // Not of this workbench: the name comes unproven. Its pin would stop it before: it takes the server for its own.
-        let _ = join(stranger.into(), Role::Operator, HOSTILE).await;
-        // Rightly inside, with a name that is none.
-        let refused = join(key.clone().into(), Role::Operator, HOSTILE).await;
-        assert!(refused.is_err_and(|error| error.to_string().contains("printable")));
-        let operator = join(key.into(), Role::Operator, "alice").await.expect("in");
-        assert!(operator.post_log(LogLevel::Error, format!("log {HOSTILE}")));
-        assert!(operator.post_arm(false));
-        wait_until("the disarming is told", || server.says("event=\"disarm\""));
-        operator.close().await;
-    });
-    wait_until("all is told", || {
-        server.says("alice: log") && server.says("event=\"left\"")
-    });
-    {
-        let said = server.text();
-        let bad = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
-        assert!(!said.contains(bad), "{said:?}");
-        assert!(
-            !said.lines().any(|line| line.starts_with("ERROR taut")),
-            "{said}"
-        );
-        let line = |parts: &[&str]| {
-            let found = said.lines().any(|line| {
-                line.contains("taut::audit") && parts.iter().all(|part| line.contains(part))
-            });
-            assert!(found, "{parts:?} in {said}");
-        };
-        line(&[
-            "event=\"refused\"",
-            "address=127.0.0.1:",
-            "\\u{1b}[2J",
-            "printable bytes",
-        ]);
-        line(&[
-            "event=\"joined\"",
-            "node=alice",
-            "role=operator",
-            "credential=\"the cluster key\"",
-            "address=127.0.0.1:",
-        ]);
-        line(&[
-            "event=\"disarm\"",
-            "node=alice",
-            "role=operator",
-            "credential=\"the cluster key\"",
-            "address=127.0.0.1:",
-        ]);
+/// Nothing of [`HOSTILE`] acts on a terminal, and the audit trail has who knocked.
+fn assert_harmless_and_audited(said: &str) {
+    let bad = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+    assert!(!said.contains(bad), "{said:?}");
+    assert!(
+        !said.lines().any(|line| line.starts_with("ERROR taut")),
+        "{said}"
+    );
+    let audited = |parts: &[&str]| {
+        let found = said.lines().any(|line| {
+            line.contains("taut::audit") && parts.iter().all(|part| line.contains(part))
+        });
+        assert!(found, "{parts:?} in {said}");
+    };
+    let address = "address=127.0.0.1:";
+    audited(&[
+        "event=\"refused\"",
+        address,
+        "\\u{1b}[2J",
+        "printable bytes",
+    ]);
+    for event in ["event=\"joined\"", "event=\"disarm\""] {
+        let credential = "credential=\"the cluster key\"";
+        audited(&[event, "node=alice", "role=operator", credential, address]);
     }
+}
 
-    // Prometheus, from here and from elsewhere.
+/// Metrics for Prometheus, from here and not from elsewhere.
+fn assert_metrics_are_served(page: &str) {
     let here = format!("Host: {page}\r\n");
     wait_until("a measurement", || {
-        get(&page, "/metrics", &here).starts_with("HTTP/1.1 200")
+        get(page, "/metrics", &here).starts_with("HTTP/1.1 200")
     });
-    let metrics = get(&page, "/metrics", &here);
-    assert!(
-        metrics.contains("application/openmetrics-text"),
-        "{metrics}"
-    );
+    let metrics = get(page, "/metrics", &here);
     for name in [
+        "application/openmetrics-text",
         "taut_haptics_rate_hertz",
         "taut_deadline_misses_total",
         "taut_network_refused_total",
@@ -126,16 +105,36 @@ fn what_strangers_and_clients_write_is_shown_harmless_and_audited_and_metrics_ar
     ] {
         assert!(metrics.contains(name), "{name} in {metrics}");
     }
-    assert!(get(&page, "/metrics", "Host: rebound.example\r\n").starts_with("HTTP/1.1 403"));
     let foreign = format!("{here}Origin: http://evil.example\r\n");
-    assert!(get(&page, "/metrics", &foreign).starts_with("HTTP/1.1 403"));
+    for headers in ["Host: rebound.example\r\n", &foreign] {
+        assert!(get(page, "/metrics", headers).starts_with("HTTP/1.1 403"));
+    }
+}
+
+#[test]
+fn hostile_names_are_shown_harmless_and_audited_and_metrics_are_served() {
+    let place = Workplace::new();
+    place.write("workbench.toml", &with_observers());
+    let lines = place.text("metrics.jsonl");
+    let more = ["--metrics-json", &lines, "--metrics-period", "0.2"];
+    let server = serve(&place, &more, &[]);
+    let page = server.word_after("observers: http://");
+    let page = page.trim_end_matches(['/', ',']);
+
+    let key = read_key_file(&place.path("cluster.key")).expect("the key");
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+    runtime.block_on(knock(&server, key));
+    wait_until("all is told", || {
+        server.says("alice: log") && server.says("event=\"left\"")
+    });
+    assert_harmless_and_audited(&server.text());
+    assert_metrics_are_served(page);
+
     let file = || std::fs::read_to_string(place.path("metrics.jsonl")).unwrap_or_default();
     wait_until("two lines of metrics", || file().lines().count() >= 2);
-    let first = file()
-        .lines()
-        .next()
-        .map(serde_json::from_str::<serde_json::Value>);
-    let first = first.expect("a line").expect("JSON");
+    let text = file();
+    let first = text.lines().next().expect("a line");
+    let first: serde_json::Value = serde_json::from_str(first).expect("JSON");
     assert!(
         first["haptics_hz"].is_number() && first["network"]["forged"] == 0,
         "{first}"
