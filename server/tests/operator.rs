@@ -115,10 +115,7 @@ impl Served {
     /// What the page itself sends with a deed.
     fn shown(&self) -> String {
         let origin = format!("Origin: http://{}\r\n", self.address);
-        format!(
-            "{}{origin}Authorization: Bearer {TOKEN}\r\nContent-Length: 0\r\n",
-            self.host()
-        )
+        self.host() + &origin + &bearer(TOKEN) + "Content-Length: 0\r\n"
     }
 
     pub(crate) fn status(&self) -> Option<Value> {
@@ -136,36 +133,25 @@ impl Served {
     }
 }
 
-#[test]
-fn the_token_arms_and_disarms_and_whoever_has_none_is_refused_and_audited() {
-    let served = Served::start(&with_token_file());
-    served.wait_for_run("paused");
+fn bearer(token: &str) -> String {
+    format!("Authorization: Bearer {token}\r\n")
+}
+
+/// Nobody acts without the token, from another page or by anything but POST, and each is audited.
+fn assert_refused(served: &Served) {
     let (host, shown) = (served.host(), served.shown());
-    let bearer = |token: &str| format!("Authorization: Bearer {token}\r\n");
+    let wrong = host.clone() + &bearer("0123456789abcdef0123456789abcdeF");
+    let rebound = format!("Host: rebound.example\r\n{}", bearer(TOKEN));
+    let foreign = format!("{host}Origin: http://evil.example\r\n{}", bearer(TOKEN));
     for (line, headers, status, reason) in [
-        ("POST /arm", host.clone(), 401, "no token"),
-        (
-            "POST /arm",
-            host.clone() + &bearer("0123456789abcdef0123456789abcdeF"),
-            401,
-            "a wrong token",
-        ),
-        (
-            "POST /arm",
-            format!("Host: rebound.example\r\n{}", bearer(TOKEN)),
-            403,
-            "a page from elsewhere",
-        ),
-        (
-            "POST /arm",
-            format!("{host}Origin: http://evil.example\r\n{}", bearer(TOKEN)),
-            403,
-            "a page from elsewhere",
-        ),
-        ("GET /arm", shown.clone(), 405, "not by POST"),
-        ("GET /disarm", shown.clone(), 405, "not by POST"),
+        ("POST /arm", &host, 401, "no token"),
+        ("POST /arm", &wrong, 401, "a wrong token"),
+        ("POST /arm", &rebound, 403, "a page from elsewhere"),
+        ("POST /arm", &foreign, 403, "a page from elsewhere"),
+        ("GET /arm", &shown, 405, "not by POST"),
+        ("GET /disarm", &shown, 405, "not by POST"),
     ] {
-        let (found, text) = served.ask(line, &headers);
+        let (found, text) = served.ask(line, headers);
         assert_eq!(found, status, "{line} {headers} {text}");
         let parts = [
             "taut::audit",
@@ -181,28 +167,30 @@ fn the_token_arms_and_disarms_and_whoever_has_none_is_refused_and_audited() {
         let (status, _) = served.ask("POST /arm", &(host.clone() + &bearer("guess")));
         assert_eq!(status, 401);
     }
+}
+
+#[test]
+fn the_token_arms_and_disarms_and_who_has_none_is_refused_and_audited() {
+    let served = Served::start(&with_token_file());
+    served.wait_for_run("paused");
+    assert_refused(&served);
     assert_eq!(served.now("run"), "paused", "none of it armed");
     // The coupling computes forces meanwhile; the page tells what the hand feels.
     wait_until("contact", || served.now("contacts").as_u64() > Some(0));
     assert_eq!(served.now("force_n"), 0.0);
     assert_eq!(served.now("largest_force_n"), 0.0);
 
+    let does = |line: &str, headers: &str, said: &str| {
+        assert_eq!(served.ask(line, headers), (200, said.to_owned()));
+    };
+    let shown = served.shown();
     assert_eq!(served.ask("POST /token", &shown).0, 200);
-    assert_eq!(
-        served.ask("POST /arm", &shown),
-        (200, "armed: the force ramps in".to_owned())
-    );
+    does("POST /arm", &shown, "armed: the force ramps in");
     served.wait_for_run("running");
     wait_until("the hand feels it", || {
-        served
-            .now("force_n")
-            .as_f64()
-            .is_some_and(|force| force > FELT)
+        served.now("force_n").as_f64() > Some(FELT)
     });
-    assert_eq!(
-        served.ask("POST /arm", &shown),
-        (200, "armed already".to_owned())
-    );
+    does("POST /arm", &shown, "armed already");
     wait_until("arming is audited", || {
         served.says(&[
             "taut::audit",
@@ -216,11 +204,8 @@ fn the_token_arms_and_disarms_and_whoever_has_none_is_refused_and_audited() {
     // A program with the token, beside the page, and beside many who connect and say nothing.
     let connect = |_| TcpStream::connect(&served.address).expect("the page's port");
     let _silent: Vec<TcpStream> = (0..100).map(connect).collect();
-    let program = host.clone() + &bearer(TOKEN);
-    assert_eq!(
-        served.ask("POST /disarm", &program),
-        (200, "disarmed: the force fades".to_owned())
-    );
+    let program = served.host() + &bearer(TOKEN);
+    does("POST /disarm", &program, "disarmed: the force fades");
     served.wait_for_run("paused");
     wait_until("the hand feels nothing", || served.now("force_n") == 0.0);
     wait_until("disarming is audited", || {

@@ -11,7 +11,7 @@ use crate::operator::{Served, with_token_file};
 use crate::support::{Workplace, wait_until};
 
 /// Recordings until one is whole: what a starved recorder could not write in time is missing, and said to be.
-const ATTEMPTS: u32 = 5;
+const ATTEMPTS: usize = 5;
 /// Updates that a recording must hold to be worth something.
 const UPDATES: usize = 200;
 
@@ -42,6 +42,11 @@ impl Served {
         self.edit(&json!({ "recording": on }))
     }
 
+    fn refuses(&self, edit: &Value, why: &str) {
+        let (status, said) = self.edit(edit);
+        assert!(status == 409 && said.contains(why), "{edit}: {said}");
+    }
+
     fn folders(&self) -> Vec<PathBuf> {
         let folder = std::fs::read_dir(self.place.path("recordings"));
         let mut found: Vec<PathBuf> = folder
@@ -57,8 +62,44 @@ fn rows(directory: &Path, name: &str) -> usize {
     text.lines().count()
 }
 
+/// Begins a recording, the `count`-th of this page, and waits until it holds enough; its folder.
+fn begin(served: &Served, count: usize) -> PathBuf {
+    let (status, said) = served.record(true);
+    assert_eq!(status, 200, "{said}");
+    assert!(
+        said.contains("GB an hour") && said.contains("are free there"),
+        "{said}"
+    );
+    let recording = PathBuf::from(served.standing("recording").as_str().expect("a folder"));
+    assert!(said.contains(&recording.display().to_string()), "{said}");
+    assert_eq!(served.folders().len(), count, "each its own");
+    assert!(
+        recording.starts_with(served.place.path("recordings")),
+        "{recording:?}"
+    );
+    served.wait_for_run("running");
+    wait_until("it is written", || {
+        served.now("recorded") == true
+            && rows(&recording, "updates.csv") > UPDATES
+            && rows(&recording, "forces.csv") > UPDATES
+    });
+    recording
+}
+
+/// Whether the recording is complete; then it is computed again bit by bit.
+fn is_whole(recording: &Path) -> bool {
+    let report = recorded::run(recording, None, false, &Shutdown::default());
+    let report = report.unwrap_or_else(|error| panic!("{error}"));
+    if report.complete {
+        assert!(report.updates as usize > UPDATES / 2, "{report}");
+        assert_eq!(report.first_difference, None);
+        assert_eq!((report.different_updates, report.different_forces), (0, 0));
+    }
+    report.complete
+}
+
 #[test]
-fn a_recording_from_the_page_is_computed_again_bit_by_bit_and_the_session_goes_on() {
+fn a_recording_from_the_page_replays_bit_by_bit_and_the_session_goes_on() {
     let served = serve("recordings = \"recordings\"\n", &["--follow-scene"]);
     served.wait_for_run("running");
     assert_eq!(served.standing("recording"), Value::Null);
@@ -67,64 +108,31 @@ fn a_recording_from_the_page_is_computed_again_bit_by_bit_and_the_session_goes_o
         !served.place.path("recordings").exists(),
         "nothing before it is asked for"
     );
-    let (status, said) = served.record(false);
-    assert!(status == 409 && said.contains("not recorded"), "{said}");
+    served.refuses(&json!({ "recording": false }), "not recorded");
     // What was changed and is not in the file is recorded as it runs, and stays so.
     let (status, said) = served.edit(&json!({ "edits": ["coupling.k_h=1500"] }));
     assert_eq!(status, 200, "{said}");
     let not_kept = served.standing("not_kept");
-
-    let mut revision = served.standing("revision").as_u64().expect("a number");
-    let mut whole = 0;
-    for attempt in 1..=ATTEMPTS as usize {
-        let (status, said) = served.record(true);
-        assert_eq!(status, 200, "{said}");
-        assert!(
-            said.contains("GB an hour") && said.contains("are free there"),
-            "{said}"
-        );
-        let recording = PathBuf::from(served.standing("recording").as_str().expect("a folder"));
-        assert!(said.contains(&recording.display().to_string()), "{said}");
-        assert_eq!(served.folders().len(), attempt, "each its own");
-        assert!(
-            recording.starts_with(served.place.path("recordings")),
-            "{recording:?}"
-        );
+    let before = served.standing("revision").as_u64().expect("a number");
+    let whole = (1..=ATTEMPTS).any(|attempt| {
+        let revision = before + 2 * (attempt as u64 - 1);
+        let recording = begin(&served, attempt);
         assert_eq!(served.standing("revision"), revision + 1);
         assert_eq!(served.standing("not_kept"), not_kept);
-        served.wait_for_run("running");
-        wait_until("it is written", || {
-            served.now("recorded") == true
-                && rows(&recording, "updates.csv") > UPDATES
-                && rows(&recording, "forces.csv") > UPDATES
-        });
         // A recording is of one scene, and there is one.
-        let (status, said) = served.record(true);
-        assert!(status == 409 && said.contains("already"), "{said}");
-        let (status, said) = served.edit(&json!({ "edits": ["coupling.k_h=1000"] }));
-        assert!(
-            status == 409 && said.contains("end the recording first"),
-            "{said}"
-        );
+        served.refuses(&json!({ "recording": true }), "already");
+        let edit = json!({ "edits": ["coupling.k_h=1000"] });
+        served.refuses(&edit, "end the recording first");
 
         let (status, said) = served.record(false);
         assert_eq!(status, 200, "{said}");
-        revision += 2;
-        assert_eq!(served.standing("revision"), revision);
+        assert_eq!(served.standing("revision"), revision + 2);
         assert_eq!(served.standing("recording"), Value::Null);
         served.wait_for_run("running");
         wait_until("no recording", || served.now("recorded") == false);
-        let report = recorded::run(&recording, None, false, &Shutdown::default());
-        let report = report.unwrap_or_else(|error| panic!("{error}"));
-        if report.complete {
-            assert!(report.updates as usize > UPDATES / 2, "{report}");
-            assert_eq!(report.first_difference, None);
-            assert_eq!((report.different_updates, report.different_forces), (0, 0));
-            whole += 1;
-            break;
-        }
-    }
-    assert_eq!(whole, 1, "no recording is whole");
+        is_whole(&recording)
+    });
+    assert!(whole, "no recording is whole");
     wait_until("it is audited", || {
         served.says(&[
             "taut::audit",
@@ -133,8 +141,11 @@ fn a_recording_from_the_page_is_computed_again_bit_by_bit_and_the_session_goes_o
             "recording to",
         ])
     });
+    assert_another_scene_ends_a_recording(&served);
+}
 
-    // An edited file ends the recording of the scene that it was, and says so.
+/// An edited file ends the recording of the scene that it was, and says so.
+fn assert_another_scene_ends_a_recording(served: &Served) {
     let (status, said) = served.record(true);
     assert_eq!(status, 200, "{said}");
     let recording = served.standing("recording");
@@ -165,8 +176,7 @@ fn where_no_recording_can_begin_the_page_says_why_and_nothing_is_made() {
             "{why}: {reason}"
         );
         for on in [true, false] {
-            let (status, said) = served.record(on);
-            assert!(status == 409 && said.contains(why), "{said}");
+            served.refuses(&json!({ "recording": on }), why);
         }
         assert_eq!(served.standing("revision"), 1);
         assert!(served.folders().is_empty());
@@ -179,11 +189,7 @@ fn where_no_recording_can_begin_the_page_says_why_and_nothing_is_made() {
 
     // A folder that cannot be had is found before the session that runs is touched.
     let served = serve("recordings = \"workbench.toml/recordings\"\n", &[]);
-    let (status, said) = served.record(true);
-    assert!(
-        status == 409 && said.contains("`recordings` in [operator]"),
-        "{said}"
-    );
+    served.refuses(&json!({ "recording": true }), "`recordings` in [operator]");
     for wish in [
         json!({ "recording": true, "edits": ["coupling.k_h=1000"] }),
         json!({ "recording": true, "keep": true }),
@@ -191,10 +197,9 @@ fn where_no_recording_can_begin_the_page_says_why_and_nothing_is_made() {
         json!({ "recording": "yes" }),
         json!({ "recording": 1 }),
     ] {
-        let (status, said) = served.edit(&wish);
-        assert_eq!(status, 409, "{wish}: {said}");
+        served.refuses(&wish, "");
     }
-    let (status, said) = served.edit(&json!({ "revision": 9, "recording": true }));
-    assert!(status == 409 && said.contains("revision 9"), "{said}");
+    let stale = json!({ "revision": 9, "recording": true });
+    served.refuses(&stale, "revision 9");
     assert_eq!(served.standing("revision"), 1);
 }
