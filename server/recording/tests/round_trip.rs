@@ -87,21 +87,19 @@ fn lines(directory: &Path, file: &str) -> Vec<String> {
     }
 }
 
-#[test]
-fn records_come_back_bit_by_bit() {
-    let directory = tempfile::tempdir().expect("no temporary directory");
-    let path = directory.path().join("new");
-    let (mut taps, recorder) = Recorder::start(&path, manifest(), "name = \"none\"\n")
-        .unwrap_or_else(|error| panic!("{error}"));
-    let force = ForceRecord {
+fn force() -> ForceRecord {
+    ForceRecord {
         sequence: 1,
         time: Duration::from_nanos(123_456_789),
         device_sequence: 9,
         device_pose: pose(17),
         constraint_sequence: 8,
         wrench: Vector6::new(1e-9, 2.0, -0.0, 1.0 / 7.0, 5.0, 6.0),
-    };
-    let tick = |time, faulty| HapticsRecord {
+    }
+}
+
+fn tick(time: u64, faulty: bool) -> HapticsRecord {
+    HapticsRecord {
         sequence: 1,
         time: Duration::from_millis(time),
         tick: Duration::from_millis(time),
@@ -110,7 +108,13 @@ fn records_come_back_bit_by_bit() {
         buttons: 1,
         faulty,
         wrench: Vector6::zeros(),
-    };
+    }
+}
+
+/// Six updates, a force, two constraints, three ticks of which two are good and at one time, and an event.
+fn record(path: &Path) {
+    let (mut taps, recorder) = Recorder::start(path, manifest(), "name = \"none\"\n")
+        .unwrap_or_else(|error| panic!("{error}"));
     let mut set = ConstraintSet::with_capacity(2);
     set.sequence = 4;
     set.constraints = vec![row(), row()];
@@ -118,7 +122,7 @@ fn records_come_back_bit_by_bit() {
         for sequence in 1..=6 {
             taps.updates.push(update(sequence));
         }
-        taps.forces.push(force);
+        taps.forces.push(force());
         taps.constraints.push_set(&set);
         taps.haptics.push(tick(5, false));
         taps.haptics.push(tick(5, false));
@@ -132,7 +136,13 @@ fn records_come_back_bit_by_bit() {
     let summary = recorder.finish();
     assert!(summary.failure.is_none());
     assert_eq!((summary.updates, summary.ticks), (6, 3));
+}
 
+#[test]
+fn records_come_back_bit_by_bit_and_what_is_cut_off_is_missed() {
+    let directory = tempfile::tempdir().expect("no temporary directory");
+    let path = directory.path().join("new");
+    record(&path);
     let recording = Recording::open(&path).unwrap_or_else(|error| panic!("{error}"));
     assert!(recording.manifest().complete);
     assert_eq!(recording.scene(), "name = \"none\"\n");
@@ -148,16 +158,13 @@ fn records_come_back_bit_by_bit() {
         assert_eq!(bits(&read.pose), bits(&pose(sequence + 1)));
     }
     assert!(matches!(updates.next_record(), Ok(None)));
-    assert!(matches!(forces.next_record(), Ok(Some(read)) if read == force));
+    assert!(matches!(forces.next_record(), Ok(Some(read)) if read == force()));
     // All is there, and says so; what somebody cut off afterwards is missed, at whichever end of a line.
     assert!(matches!(forces.next_record(), Ok(None)));
     let text = std::fs::read_to_string(path.join("forces.csv")).unwrap_or_default();
     let header = text.lines().next().unwrap_or_default().to_owned() + "\n";
     assert!(std::fs::write(path.join("forces.csv"), header).is_ok());
-    let mut cut = match recording.forces() {
-        Ok(cut) => cut,
-        Err(error) => panic!("{error}"),
-    };
+    let mut cut = recording.forces().unwrap_or_else(|error| panic!("{error}"));
     let missed = cut.next_record().map_err(|error| error.to_string());
     assert!(
         matches!(&missed, Err(said) if said.contains("ends after 0 records, but the session wrote 1")),

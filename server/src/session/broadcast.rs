@@ -398,44 +398,37 @@ mod tests {
         assert!((50..=51).contains(&count), "{count} states in a second");
     }
 
-    #[test]
-    fn a_state_carries_the_newest_of_everything_and_comes_once_per_sample() {
-        let start = Pose::translation(0.0, 0.0, 0.1);
-        let (mut states, mut contacts, mut wrenches, mut writer) = wired(&start);
-        assert!(writer.newest(Duration::ZERO).is_none(), "no sample yet");
-
-        let device = DeviceState {
+    /// A sample at 5 ms, with a button down.
+    fn touching(start: &Pose) -> DeviceState {
+        DeviceState {
             sequence: 5,
             time: Duration::from_millis(5),
             pose: Pose::translation(0.0, 0.0, 0.05),
             buttons: 0b10,
             safety: armed_after_a_limit(),
-            ..DeviceState::at_start(&start)
-        };
-        states.publish(&device);
-        let mut snapshot = ContactSnapshot::at_start(&start, 32);
-        snapshot
-            .set
-            .constraints
-            .extend((0..12).map(|k| constraint(k, 0.012 - 1e-3 * f64::from(k))));
+            ..DeviceState::at_start(start)
+        }
+    }
+
+    /// Contacts at 6 ms, the last of which are the nearest, and a plate that moves.
+    fn touched(start: &Pose) -> ContactSnapshot {
+        let mut snapshot = ContactSnapshot::at_start(start, 32);
+        let constraints = (0..12).map(|k| constraint(k, 0.012 - 1e-3 * f64::from(k)));
+        snapshot.set.constraints.extend(constraints);
         snapshot.published = Duration::from_millis(6);
         snapshot.report.active = 1;
         snapshot.moving.push(MovingObstacle {
             obstacle: 3,
             pose: Pose::translation(0.0, 0.25, 0.0),
         });
-        contacts.publish(&snapshot);
-        let wrench = WrenchCommand {
-            wrench: Vector6::new(0.0, 0.0, 3.0, 0.1, 0.0, 0.0),
-            saturated: true,
-            constraint_age: Duration::from_micros(250),
-            ..WrenchCommand::at_start()
-        };
-        wrenches.publish(&wrench);
+        snapshot
+    }
 
-        let state = writer
-            .newest(Duration::from_millis(7))
-            .expect("a sample was published");
+    fn codes(state: &HotState) -> Vec<u32> {
+        state.events.iter().map(|event| event.code).collect()
+    }
+
+    fn assert_tells_of_touch(state: &HotState) {
         assert_eq!(
             (state.tick, state.sample_time_ns, state.scene_revision),
             (5, 5_000_000, 7)
@@ -453,22 +446,14 @@ mod tests {
             (tool.force[2], tool.torque[0], tool.flags),
             (3.0, 0.1, TOOL_FORCE_LIMITED)
         );
-        let obstacles: Vec<u16> = state
-            .contacts
-            .iter()
-            .map(|contact| contact.pair[1])
-            .collect();
+        let obstacles = state.contacts.iter().map(|contact| contact.pair[1]);
+        let obstacles: Vec<u16> = obstacles.collect();
         assert_eq!(obstacles, [11, 10, 9, 8, 7, 6, 5, 4], "nearest first");
-        let bodies: Vec<_> = state
-            .bodies
-            .iter()
-            .map(|body| (body.id, body.pose))
-            .collect();
+        let bodies: Vec<_> = state.bodies.iter().map(|b| (b.id, b.pose)).collect();
         let plate = PoseF32::from_isometry(&Pose::translation(0.0, 0.25, 0.0));
         assert_eq!(bodies, [(3, plate)], "by the obstacle's number");
-        let codes: Vec<u32> = state.events.iter().map(|event| event.code).collect();
         assert_eq!(
-            codes,
+            codes(state),
             [
                 event_code::CONTACT_ON,
                 event_code::BUTTON_DOWN | 1 << BUTTON_SHIFT,
@@ -476,10 +461,26 @@ mod tests {
             ]
         );
         assert_eq!(state.head.age_us, -2000);
-        assert!(
-            writer.newest(Duration::from_millis(8)).is_none(),
-            "nothing new"
-        );
+    }
+
+    #[test]
+    fn a_state_carries_the_newest_of_everything_and_comes_once_per_sample() {
+        let start = Pose::translation(0.0, 0.0, 0.1);
+        let (mut states, mut contacts, mut wrenches, mut writer) = wired(&start);
+        let at = Duration::from_millis;
+        assert!(writer.newest(at(0)).is_none(), "no sample yet");
+
+        let (device, mut snapshot) = (touching(&start), touched(&start));
+        states.publish(&device);
+        contacts.publish(&snapshot);
+        wrenches.publish(&WrenchCommand {
+            wrench: Vector6::new(0.0, 0.0, 3.0, 0.1, 0.0, 0.0),
+            saturated: true,
+            constraint_age: Duration::from_micros(250),
+            ..WrenchCommand::at_start()
+        });
+        assert_tells_of_touch(writer.newest(at(7)).expect("a sample was published"));
+        assert!(writer.newest(at(8)).is_none(), "nothing new");
 
         // The god-object moves 2 mm in 2 ms.
         snapshot.set.god_object_pose = Pose::translation(0.0, 0.0, 0.098);
@@ -490,9 +491,7 @@ mod tests {
             faulty: true,
             ..device
         });
-        let state = writer
-            .newest(Duration::from_millis(9))
-            .expect("a sample was published");
+        let state = writer.newest(at(9)).expect("a sample was published");
         assert!((state.tools[0].linear_velocity[2] + 1.0).abs() < 1e-6);
         assert_eq!(state.bodies.len(), 1, "told again, not added");
         assert_eq!(state.run, RunState::Fault);
@@ -500,10 +499,7 @@ mod tests {
             state.tools[0].flags & TOOL_DEVICE_SILENT,
             TOOL_DEVICE_SILENT
         );
-        assert_eq!(
-            state.events.last().map(|event| event.code),
-            Some(event_code::FAULT)
-        );
+        assert_eq!(codes(state).last(), Some(&event_code::FAULT));
     }
 
     #[test]
