@@ -3,13 +3,14 @@
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
-use taut_link::{ClientOptions, ClusterKey, Role, serve};
-use taut_network_tests::bench::{reading, server_options, small_content};
+use taut_link::{ClientLink, ClientOptions, ClusterKey, Counters, Role, ServerLink};
+use taut_network_tests::bench::{BenchError, reading, serve_behind, server_options};
 use taut_network_tests::forge::{
     Attack, FORGERIES, Forger, Forgery, MAX_FORGED_BYTES, Seen, attack, payload_of_every_kind,
 };
-use taut_network_tests::relay::{Direction, Treatment, Waiting};
+use taut_network_tests::relay::{Direction, Relay, Treatment};
 use taut_proto::{Header, PROTOCOL_VERSION, limits::Rate};
+use tokio::runtime::Runtime;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -55,7 +56,7 @@ fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
     }
 }
 
-/// Which counter of the server a forgery belongs to, by the header alone.
+/// Which counter of the server a datagram belongs to.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Due {
     garbage: u64,
@@ -64,96 +65,117 @@ struct Due {
     refused: u64,
 }
 
+impl Due {
+    /// What the server counted since `before`.
+    fn counted(before: &Counters, now: &Counters) -> Self {
+        let refused = |of: &Counters| of.forged + of.replayed + of.flooded;
+        Self {
+            garbage: now.garbage - before.garbage,
+            wrong_version: now.wrong_version - before.wrong_version,
+            refused: refused(now) - refused(before),
+        }
+    }
+
+    /// Counts a forgery by its header alone.
+    fn count(&mut self, forged: &[u8]) {
+        match Header::parse(forged) {
+            Ok(header) if header.version != PROTOCOL_VERSION => self.wrong_version += 1,
+            Ok(_) => self.refused += 1,
+            Err(_) => self.garbage += 1,
+        }
+    }
+}
+
+/// A server, and a bridge behind a relay. They are dropped in this order.
+struct Session {
+    bridge: ClientLink,
+    relay: Relay,
+    server: ServerLink,
+    _runtime: Runtime,
+}
+
+impl Session {
+    /// The bridge has sent 50 inputs and is behind a black hole now: what is under way is known, and nothing else moves the counters.
+    fn silenced() -> Result<Self, BenchError> {
+        let runtime = Runtime::new()?;
+        let key = ClusterKey::generate()?;
+        let mut options = server_options(&key);
+        // The thief may send as much as it likes, so that every datagram is looked at; the bridge is silent for longer than a node may be.
+        let rate = Rate {
+            per_second: 1_000_000,
+            burst: 1_000_000,
+        };
+        options.limits.unknown_source = rate;
+        options.limits.unknown_sources = rate;
+        (options.idle_timeout, options.node_timeout) = (10 * PATIENCE, PATIENCE);
+        let (server, relay) = serve_behind(&runtime, options, vec![Treatment::default()], 1)?;
+        let options = ClientOptions {
+            idle_timeout: 10 * PATIENCE,
+            connect_timeout: PATIENCE,
+            ..ClientOptions::new(server.quic_addr().to_string(), key, Role::Device, "bridge")
+        };
+        let bridge = runtime.block_on(taut_link::connect(options))?;
+        for index in 1..=50 {
+            bridge.send_input(&reading(index));
+        }
+        wait_until("the inputs", || {
+            let counters = server.counters();
+            counters.inputs + counters.inputs_late == 50
+        });
+        relay.set_black_hole(true);
+        wait_until("quiet", || {
+            let counts = relay.counts(Direction::Up);
+            counts.passed + counts.swallowed == counts.received
+                && server.counters().packets_received == counts.passed
+        });
+        Ok(Self {
+            bridge,
+            relay,
+            server,
+            _runtime: runtime,
+        })
+    }
+
+    /// What a thief took of the bridge's datagrams, and a forger of that session.
+    fn stolen(&self) -> (Seen, Forger) {
+        let taken = self.relay.upstream()[..40].to_vec();
+        let header = Header::parse(&taken[30]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coming = taken[30].clone();
+        coming[12..20].copy_from_slice(&(header.sequence + 1_000_000).to_le_bytes());
+        let seen = Seen {
+            other_way: coming.clone(),
+            coming,
+            taken,
+        };
+        (seen, Forger::new(9, header.epoch, header.sender))
+    }
+}
+
 #[test]
-fn a_servers_counters_account_for_every_one_of_a_hundred_thousand_on_its_socket() {
+fn a_servers_counters_account_for_each_of_100000_forgeries() {
     /// Sent before the server is waited for: fewer than its socket holds.
     const AT_A_TIME: u64 = 50;
     const FORGERIES_SENT: u64 = 100_000;
-    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
-    let waiting = Waiting::bind().unwrap_or_else(|error| panic!("{error}"));
-    let key = ClusterKey::generate().expect("a key");
-    let mut options = server_options(&key);
-    options.announced_udp_port = Some(waiting.address().port());
-    // The thief may send as much as it likes, so that every datagram is looked at; the bridge is silent for longer than a node may be.
-    let rate = Rate {
-        per_second: 1_000_000,
-        burst: 1_000_000,
-    };
-    (
-        options.limits.unknown_source,
-        options.limits.unknown_sources,
-    ) = (rate, rate);
-    (options.idle_timeout, options.node_timeout) = (10 * PATIENCE, PATIENCE);
-    let server = runtime
-        .block_on(serve(options, small_content()))
-        .unwrap_or_else(|error| panic!("{error}"));
-    let relay = waiting
-        .start(server.udp_addr(), vec![Treatment::default()], 1)
-        .unwrap_or_else(|error| panic!("{error}"));
-    let options = ClientOptions {
-        idle_timeout: 10 * PATIENCE,
-        connect_timeout: PATIENCE,
-        ..ClientOptions::new(server.quic_addr().to_string(), key, Role::Device, "bridge")
-    };
-    let bridge = runtime
-        .block_on(taut_link::connect(options))
-        .unwrap_or_else(|error| panic!("{error}"));
-    for index in 1..=50 {
-        bridge.send_input(&reading(index));
-    }
-    wait_until("the inputs", || {
-        let counters = server.counters();
-        counters.inputs + counters.inputs_late == 50
-    });
-    // From now on the bridge is behind a black hole: what is under way is known, and nothing else moves the counters.
-    relay.set_black_hole(true);
-    let settled = || {
-        let counts = relay.counts(Direction::Up);
-        counts.passed + counts.swallowed == counts.received
-            && server.counters().packets_received == counts.passed
-    };
-    wait_until("quiet", settled);
-
-    let stolen = relay.upstream();
-    let taken: Vec<Vec<u8>> = stolen[..40].to_vec();
-    let template = taken[30].clone();
-    let header = Header::parse(&template).unwrap_or_else(|error| panic!("{error}"));
-    let mut coming = template;
-    coming[12..20].copy_from_slice(&(header.sequence + 1_000_000).to_le_bytes());
-    let seen = Seen {
-        other_way: coming.clone(),
-        coming,
-        taken,
-    };
-    let mut forger = Forger::new(9, header.epoch, header.sender);
+    let session = Session::silenced().unwrap_or_else(|error| panic!("{error}"));
+    let server = &session.server;
+    let (seen, mut forger) = session.stolen();
     let payloads = payload_of_every_kind();
     let thief = UdpSocket::bind("127.0.0.1:0").expect("a socket");
     let before = server.counters();
     let path = server.clients()[0].udp_address;
     let (mut due, mut buffer) = (Due::default(), [0; MAX_FORGED_BYTES]);
-    let counted = || {
-        let now = server.counters();
-        Due {
-            garbage: now.garbage - before.garbage,
-            wrong_version: now.wrong_version - before.wrong_version,
-            refused: now.forged + now.replayed + now.flooded
-                - (before.forged + before.replayed + before.flooded),
-        }
-    };
     for number in 0..FORGERIES_SENT {
         let forgery = FORGERIES[number as usize % FORGERIES.len()];
         let payload = &payloads[number as usize / FORGERIES.len() % payloads.len()];
         let length = forger.forge(forgery, &seen, payload, &mut buffer);
-        match Header::parse(&buffer[..length]) {
-            Ok(header) if header.version != PROTOCOL_VERSION => due.wrong_version += 1,
-            Ok(_) => due.refused += 1,
-            Err(_) => due.garbage += 1,
-        }
+        due.count(&buffer[..length]);
         thief
             .send_to(&buffer[..length], server.udp_addr())
             .expect("loopback takes it");
         if number % AT_A_TIME == AT_A_TIME - 1 {
-            wait_until("counting", || counted() == due);
+            wait_until("counting", || {
+                Due::counted(&before, &server.counters()) == due
+            });
         }
     }
     assert_eq!(
@@ -177,10 +199,10 @@ fn a_servers_counters_account_for_every_one_of_a_hundred_thousand_on_its_socket(
     );
 
     // The one that was coming all the time still gets through.
-    relay.set_black_hole(false);
+    session.relay.set_black_hole(false);
     wait_until("a genuine datagram", || {
         server.counters().packets_received > before.packets_received
     });
     assert!(FORGERIES.contains(&Forgery::Replayed));
-    assert_eq!(bridge.is_closed(), None);
+    assert_eq!(session.bridge.is_closed(), None);
 }

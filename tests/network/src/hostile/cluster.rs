@@ -8,10 +8,10 @@ use taut_link::proto::barrier::{Arrive, MAX_MEMBERS, MOST_TERMS_AHEAD, MasterSet
 use taut_link::proto::events::EventAck;
 use taut_link::proto::header::MAX_DATAGRAM_BYTES;
 use taut_link::proto::state::RunState;
-use taut_link::proto::{Holder, JoinKey, Payload, confirmation};
+use taut_link::proto::{Group, Holder, JoinKey, Payload, confirmation};
 use taut_link::{
-    ClientLink, ClusterKey, FrameReport, FrameTurn, LinkError, LinkEvent, MulticastOptions, Role,
-    ServerLink, ServerOptions, connect, serve,
+    ClientLink, ClusterKey, FrameReport, FrameTurn, LinkError, LinkEvent, MulticastOptions,
+    ReceivedState, Role, ServerLink, ServerOptions, connect, serve,
 };
 use tokio::runtime::Runtime;
 
@@ -268,10 +268,96 @@ fn last_term(_: &Extent) -> Result<Finding, BenchError> {
     })
 }
 
-fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
+/// A free group on loopback.
+fn free_group() -> Result<SocketAddrV4, BenchError> {
     let port = UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port();
     let [high, low] = port.to_be_bytes();
-    let group = SocketAddrV4::new(Ipv4Addr::new(239, 255, high, low), port);
+    let group = Ipv4Addr::new(239, 255, high, low);
+    Ok(SocketAddrV4::new(group, port))
+}
+
+/// What came of forged states.
+#[derive(Default)]
+struct Forging {
+    alarms_before: u64,
+    sent: u32,
+    drawn: usize,
+    /// After the first of them.
+    found: Option<Duration>,
+}
+
+impl Forging {
+    /// `liar` sends them to the group at `address` for 5 s, or until `screen` has withdrawn its states.
+    fn run(
+        server: &ServerLink,
+        screen: &ClientLink,
+        (liar, group): (&Liar, &Group),
+        address: SocketAddrV4,
+    ) -> Result<Self, BenchError> {
+        let mut states = Vec::new();
+        // Genuine ones first, that none of the group's are refused for nothing.
+        std::thread::sleep(Duration::from_millis(300));
+        screen.drain_states(&mut states);
+        let mut forging = Self {
+            alarms_before: screen.states_withdrawn(),
+            ..Self::default()
+        };
+        let (mut sealer, socket) = (liar.as_server(group), to_groups()?);
+        let begun = Instant::now();
+        while forging.found.is_none() && begun.elapsed() < Duration::from_secs(5) {
+            let now_ns = server.clock().now_ns();
+            let mut forged = state(now_ns / 1_000_000 + 5, now_ns, false);
+            forged.run = RunState::Paused;
+            forged.tools[0].god_object.position[1] = 0.5;
+            if forging.sent % 5 == 4 {
+                forged.tick = 1 << 50;
+            }
+            let mut buffer = [0; MAX_DATAGRAM_BYTES];
+            let datagram = sealer.seal(&Payload::Hot(forged), u64::MAX / 4, &mut buffer);
+            let datagram = datagram.map_err(|error| BenchError::Missing(error.to_string()))?;
+            socket.send_to(datagram, &address.into())?;
+            forging.sent += 1;
+            std::thread::sleep(Duration::from_millis(2));
+            states.clear();
+            screen.drain_states(&mut states);
+            let is_forged = |state: &&ReceivedState| state.state.run == RunState::Paused;
+            let mut drawn = states.iter().filter(is_forged);
+            forging.drawn += drawn.clone().count();
+            if drawn.any(|state| state.of_server().is_some()) {
+                return Err(BenchError::Missing(
+                    "a forged state counts as the server's".into(),
+                ));
+            }
+            if screen.states_withdrawn() > forging.alarms_before {
+                forging.found = Some(begun.elapsed());
+            }
+        }
+        Ok(forging)
+    }
+
+    fn finding(self) -> Finding {
+        let (sent, alarms_before) = (self.sent, self.alarms_before);
+        let Some(found) = self.found else {
+            return Finding {
+                happened: format!("{sent} forged states, not found"),
+                kept: false,
+            };
+        };
+        let patience = Duration::from_nanos(confirmation::PATIENCE_NS);
+        Finding {
+            happened: format!(
+                "found {} ms after the first of {sent} forged states, {} of which could be drawn; named; states by unicast again; {alarms_before} false alarms before",
+                found.as_millis(),
+                self.drawn
+            ),
+            // A machine that does not run the receiving thread in time does not draw either.
+            kept: found < patience.max(Duration::from_secs(1)) && alarms_before == 0,
+        }
+    }
+}
+
+fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
+    let group = free_group()?;
     if !multicast_works(group) {
         return Ok(Finding {
             happened: "not measured: this system gives no multicast on loopback".to_owned(),
@@ -302,75 +388,21 @@ fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
             screens.any(|client| client.by_multicast)
         };
         wait_until("states by multicast", by_multicast)?;
-        let mut states = Vec::new();
-        // Genuine ones first, that none of the group's are refused for nothing.
-        std::thread::sleep(Duration::from_millis(300));
-        screen.drain_states(&mut states);
-        let alarms_before = screen.states_withdrawn();
-        states.clear();
-
-        let (mut sealer, socket) = (liar.as_server(&known), to_groups()?);
-        let (begun, mut sent, mut found, mut drawn) = (Instant::now(), 0, None, 0);
-        while found.is_none() && begun.elapsed() < Duration::from_secs(5) {
-            let now_ns = server.clock().now_ns();
-            let mut forged = state(now_ns / 1_000_000 + 5, now_ns, false);
-            forged.run = RunState::Paused;
-            forged.tools[0].god_object.position[1] = 0.5;
-            if sent % 5 == 4 {
-                forged.tick = 1 << 50;
-            }
-            let mut buffer = [0; MAX_DATAGRAM_BYTES];
-            let datagram = sealer.seal(&Payload::Hot(forged), u64::MAX / 4, &mut buffer);
-            let datagram = datagram.map_err(|error| BenchError::Missing(error.to_string()))?;
-            socket.send_to(datagram, &group.into())?;
-            sent += 1;
-            std::thread::sleep(Duration::from_millis(2));
-            screen.drain_states(&mut states);
-            let is_forged = |state: &&taut_link::ReceivedState| state.state.run == RunState::Paused;
-            drawn += states.iter().filter(is_forged).count();
-            let believed = states.iter().filter(|state| state.of_server().is_some());
-            if believed.filter(is_forged).count() > 0 {
-                return Err(BenchError::Missing(
-                    "a forged state counts as the server's".into(),
-                ));
-            }
-            states.clear();
-            if screen.states_withdrawn() > alarms_before {
-                found = Some(begun.elapsed());
-            }
-        }
-        let named = || {
-            let mut named = false;
-            while let Some(event) = server.try_event() {
-                named |= matches!(event, LinkEvent::StatesForged { node } if node == "screen");
-            }
-            named
-        };
-        wait_until("it is named", named)?;
+        let forging = Forging::run(&server, &screen, (&liar, &known), group)?;
+        wait_until("it is named", || {
+            let mut events = std::iter::from_fn(|| server.try_event());
+            events
+                .any(|event| matches!(event, LinkEvent::StatesForged { node } if node == "screen"))
+        })?;
         wait_until("states by unicast", || !by_multicast())?;
         // From now on the server's alone, whatever the liar goes on saying.
-        let mut genuine = 0;
+        let (mut states, mut genuine) = (Vec::new(), 0);
         wait_until("the server's states", || {
+            states.clear();
             screen.drain_states(&mut states);
             genuine += states.iter().filter(|s| s.of_server().is_some()).count();
-            states.clear();
             genuine >= 100
         })?;
-        let patience = Duration::from_nanos(confirmation::PATIENCE_NS);
-        let Some(found) = found else {
-            return Ok(Finding {
-                happened: format!("{sent} forged states, not found"),
-                kept: false,
-            });
-        };
-        Ok(Finding {
-            happened: format!(
-                "found {} ms after the first of {sent} forged states, {drawn} of which could be drawn; named; states by unicast again; {} false alarms before",
-                found.as_millis(),
-                alarms_before
-            ),
-            // A machine that does not run the receiving thread in time does not draw either.
-            kept: found < patience.max(Duration::from_secs(1)) && alarms_before == 0,
-        })
+        Ok(forging.finding())
     })
 }
