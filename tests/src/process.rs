@@ -196,10 +196,19 @@ impl Process {
 
     /// Asks it to end as a terminal does, and gives its report.
     pub fn leave(self) -> String {
+        self.left().stdout
+    }
+
+    /// The same with a report in JSON.
+    pub fn leave_json(self) -> serde_json::Value {
+        self.left().json()
+    }
+
+    fn left(self) -> Ended {
         self.interrupt();
         let ended = self.end(END_LIMIT);
         assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
-        ended.stdout
+        ended
     }
 
     /// Whether any process of its group is there: itself, or one that it started.

@@ -13,6 +13,7 @@ use taut_proto::PoseF32;
 use taut_proto::control::RefusalCode;
 use taut_scene::Scene;
 use taut_tests::patience::wait_for;
+use taut_tests::process::Process;
 use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
 use tokio::runtime::Runtime;
 
@@ -134,63 +135,33 @@ fn longest_silence(states: &[ReceivedState], from: Instant) -> Duration {
     gaps.max().unwrap_or(Duration::MAX)
 }
 
-#[test]
-fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
-    let mut workbench = TestWorkbench::new(PROGRAM);
-    let adapter = workbench.adapter();
-    let (mut server, bridge) = workbench.serve_with_bridge(SCENE, &["--give-up", "1"]);
-    let runtime = Runtime::new().expect("a runtime");
-    let early = Client::join(
-        &runtime,
-        Client::options(&workbench, &server, "early", Transport::Udp),
-    );
-    let over_quic = Client::join(
-        &runtime,
-        Client::options(&workbench, &server, "over-quic", Transport::QuicDatagram),
-    );
-    let recorded = workbench
-        .directory()
-        .join("recorded.csv")
-        .display()
-        .to_string();
-    let key = workbench.key_path();
-    let mut victim = workbench.start(
-        "recorder",
-        &[
-            "record",
-            "--server",
-            &server.quic,
-            "--key",
-            &key,
-            "--out",
-            &recorded,
-        ],
-    );
-    let pictures = workbench.directory().join("pictures");
-    let drawing = adapter.is_ok().then(|| {
-        let out = pictures.display().to_string();
-        let size = ["--headless", "--width", "320", "--height", "240"];
-        let arguments = [&size[..], &["--out", &out]].concat();
-        workbench.join("render", "front", &server, &arguments)
-    });
+/// A node that draws without a window, called "front".
+fn draw(workbench: &TestWorkbench, server: &Server, options: &[&str]) -> Process {
+    let options = [&["--headless"], options].concat();
+    workbench.join("render", "front", server, &options)
+}
 
-    // A late client learns the scene, and gets each mesh by its hash.
-    early.goes_on(0);
-    let late = Client::join(
-        &runtime,
-        Client::options(&workbench, &server, "late", Transport::Udp),
-    );
+/// A recorder into the workbench's directory.
+fn record(workbench: &TestWorkbench, server: &Server) -> Process {
+    let key = workbench.key_path();
+    let out = workbench.directory().join("recorded.csv");
+    let out = out.display().to_string();
+    let from = ["record", "--server", &server.quic, "--key", &key];
+    workbench.start("recorder", &[&from[..], &["--out", &out]].concat())
+}
+
+/// The client knows [`SCENE`], and gets each mesh by its hash.
+fn assert_knows_scene(runtime: &Runtime, client: &Client) {
     let scene = Scene::named_or_file(SCENE)
         .and_then(|scene| scene.build())
         .unwrap_or_else(|error| panic!("{error}"));
-    let description = late.link.description();
-    assert_eq!(description, early.link.description());
+    let description = client.link.description();
     assert_eq!(description.name, SCENE);
     let bodies = std::iter::once(&description.god_object).chain(&description.obstacles);
     assert_eq!(description.obstacles.len() + 1, scene.bodies.len());
     for (body, built) in bodies.zip(&scene.bodies) {
         let mesh = runtime
-            .block_on(late.link.mesh(body.mesh))
+            .block_on(client.link.mesh(body.mesh))
             .unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(body.name, built.name);
         assert_eq!(
@@ -198,85 +169,76 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
             (built.mesh.vertices.len(), built.mesh.triangles.len())
         );
     }
+}
 
-    if drawing.is_some() {
-        wait_for("pictures", JOIN_LIMIT, || {
-            let drawn = std::fs::read_dir(&pictures).map_or(0, Iterator::count);
-            (drawn >= PICTURES).then_some(())
-        });
-    }
-
-    // One is killed without a goodbye; after it the others go on, also when the server has given it up.
-    assert!(victim.is_running(), "the recorder ended by itself");
-    let counts = [&early, &over_quic, &late].map(|client| client.link.counters().states);
-    victim.kill();
+/// Kills the recorder without a goodbye; the clients go on, also when the server has given it up. When it was killed.
+fn kill_beside(clients: &[Client], mut recorder: Process) -> Instant {
+    assert!(recorder.is_running(), "the recorder ended by itself");
+    let states = |client: &Client| client.link.counters().states;
+    let counts: Vec<u64> = clients.iter().map(states).collect();
+    recorder.kill();
     let killed = Instant::now();
     std::thread::sleep(UNDISTURBED + Duration::from_millis(500));
-    for (client, before) in [&early, &over_quic, &late].into_iter().zip(counts) {
+    for (client, before) in clients.iter().zip(counts) {
         client.goes_on(before);
     }
-    // The hand goes round again and again: whatever was missed of it comes.
-    wait_for("a force", JOIN_LIMIT, || early.saw_force().then_some(()));
-    assert!(server.process.is_running());
+    killed
+}
 
-    let (early, over_quic, late) = (early.leave(), over_quic.leave(), late.leave());
-    for (name, states) in [
-        ("early", &early),
-        ("over-quic", &over_quic),
-        ("late", &late),
-    ] {
-        assert!(
-            states
-                .windows(2)
-                .all(|two| two[0].state.tick < two[1].state.tick),
-            "{name} saw ticks out of order"
-        );
-        assert!(
-            states
-                .windows(2)
-                .all(|two| two[0].state.sample_time_ns <= two[1].state.sample_time_ns),
-            "{name} saw time run back"
-        );
-        let silence = longest_silence(states, killed);
-        println!(
-            "{name}: {} states, longest silence {silence:?}",
-            states.len()
-        );
-        assert!(
-            silence < UNDISTURBED,
-            "{name} heard nothing for {silence:?}"
-        );
-    }
-    let reference = god_objects(&early);
-    for (name, states) in [("over-quic", &over_quic), ("late", &late)] {
-        let mut common = 0;
-        for (tick, pose) in god_objects(states) {
-            if let Some(other) = reference.get(&tick) {
-                assert_eq!(*other, pose, "{name} sees another world at tick {tick}");
-                common += 1;
-            }
-        }
-        assert!(common > 50, "{name} shares only {common} ticks");
-    }
+/// Ticks and times rise, and states came all the time `from` this moment on.
+fn assert_undisturbed(name: &str, states: &[ReceivedState], from: Instant) {
+    let mut pairs = states.windows(2).map(|two| (&two[0].state, &two[1].state));
     assert!(
-        early
+        pairs.clone().all(|(a, b)| a.tick < b.tick),
+        "{name} saw ticks out of order"
+    );
+    assert!(
+        pairs.all(|(a, b)| a.sample_time_ns <= b.sample_time_ns),
+        "{name} saw time run back"
+    );
+    let silence = longest_silence(states, from);
+    println!(
+        "{name}: {} states, longest silence {silence:?}",
+        states.len()
+    );
+    assert!(
+        silence < UNDISTURBED,
+        "{name} heard nothing for {silence:?}"
+    );
+}
+
+/// Who shares a tick with the reference shares its god-object.
+fn assert_same_world(name: &str, states: &[ReceivedState], reference: &HashMap<u64, PoseF32>) {
+    let mut common = 0;
+    for (tick, pose) in god_objects(states) {
+        if let Some(other) = reference.get(&tick) {
+            assert_eq!(*other, pose, "{name} sees another world at tick {tick}");
+            common += 1;
+        }
+    }
+    assert!(common > 50, "{name} shares only {common} ticks");
+}
+
+/// The sphere moves, touches and pushes back.
+fn assert_pushes(states: &[ReceivedState]) {
+    assert!(
+        states
             .windows(2)
             .any(|two| two[0].state.tools[0].god_object != two[1].state.tools[0].god_object),
         "nothing moves"
     );
-
-    // The sphere touches and pushes back, and the push reaches the device.
-    let strongest = early.iter().map(force).fold(0.0, f32::max);
+    let strongest = states.iter().map(force).fold(0.0, f32::max);
     assert!(strongest > 1.0, "the largest force told is {strongest} N");
     assert!(
-        early
+        states
             .iter()
             .any(|received| !received.state.contacts.is_empty() && force(received) > 1.0)
     );
-    bridge.interrupt();
-    let ended = bridge.end(END_LIMIT);
-    assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
-    let report = ended.json();
+}
+
+/// The push reached the device.
+fn assert_felt(bridge: Process) {
+    let report = bridge.leave_json();
     assert!(
         report["max_force_n"].as_f64() > Some(1.0),
         "the device felt {} N",
@@ -289,35 +251,82 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
         "{} sets",
         report["sets"]
     );
+}
 
-    if let Some(drawing) = drawing {
-        drawing.interrupt();
-        assert!(drawing.end(END_LIMIT).status.success());
-    } else {
-        taut_test_kit::left_out("the render node, because there is no adapter");
-    }
-    let report = server.stop();
+/// The server has told of everybody who was there, and of the node's frames if one was `drawn`.
+fn assert_told(report: &serde_json::Value, drawn: bool) {
     assert_eq!(report["penetrations"], 0);
     let node = |name: &str| {
-        report["clients"]
-            .as_array()
-            .and_then(|all| all.iter().find(|client| client["node"] == name))
-            .cloned()
+        let mut all = report["clients"].as_array().into_iter().flatten();
+        all.find(|client| client["node"] == name)
+            .unwrap_or_else(|| panic!("no {name} in {}", report["clients"]))
     };
-    assert!(
-        ["early", "over-quic", "late", "bridge"]
-            .iter()
-            .all(|name| node(name).is_some()),
-        "{}",
-        report["clients"]
-    );
-    assert_eq!(node("over-quic").expect("listed")["transport"], "quic");
-    if adapter.is_ok() {
-        let front = node("front").expect("listed");
+    for name in ["early", "late", "bridge"] {
+        node(name);
+    }
+    assert_eq!(node("over-quic")["transport"], "quic");
+    if drawn {
+        let front = node("front");
         assert!(front["frames"].as_u64() >= Some(TOLD_FRAMES), "{front}");
         assert_eq!(front["state_hash_mismatches"], 0);
     }
     assert_eq!(report["observers"], 1);
+}
+
+#[test]
+fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    let adapter = workbench.adapter();
+    let (mut server, bridge) = workbench.serve_with_bridge(SCENE, &["--give-up", "1"]);
+    let runtime = Runtime::new().expect("a runtime");
+    let join = |node, transport| {
+        Client::join(
+            &runtime,
+            Client::options(&workbench, &server, node, transport),
+        )
+    };
+    let early = join("early", Transport::Udp);
+    let over_quic = join("over-quic", Transport::QuicDatagram);
+    let recorder = record(&workbench, &server);
+    let pictures = workbench.directory().join("pictures");
+    let out = pictures.display().to_string();
+    let options = ["--width", "320", "--height", "240", "--out", &out];
+    let drawing = adapter.is_ok().then(|| draw(&workbench, &server, &options));
+
+    early.goes_on(0);
+    let late = join("late", Transport::Udp);
+    assert_eq!(late.link.description(), early.link.description());
+    assert_knows_scene(&runtime, &late);
+    if drawing.is_some() {
+        wait_for("pictures", JOIN_LIMIT, || {
+            let drawn = std::fs::read_dir(&pictures).map_or(0, Iterator::count);
+            (drawn >= PICTURES).then_some(())
+        });
+    }
+
+    let clients = [early, over_quic, late];
+    let killed = kill_beside(&clients, recorder);
+    // The hand goes round again and again: whatever was missed of it comes.
+    wait_for("a force", JOIN_LIMIT, || {
+        clients[0].saw_force().then_some(())
+    });
+    assert!(server.process.is_running());
+
+    let [early, over_quic, late] = clients.map(Client::leave);
+    let reference = god_objects(&early);
+    assert_undisturbed("early", &early, killed);
+    for (name, states) in [("over-quic", &over_quic), ("late", &late)] {
+        assert_undisturbed(name, states, killed);
+        assert_same_world(name, states, &reference);
+    }
+    assert_pushes(&early);
+    assert_felt(bridge);
+    if let Some(drawing) = drawing {
+        drawing.leave();
+    } else {
+        taut_test_kit::left_out("the render node, because there is no adapter");
+    }
+    assert_told(&server.stop(), adapter.is_ok());
 }
 
 #[test]
@@ -370,22 +379,8 @@ fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end_when_they_
     workbench.log = Some("warn,taut=info");
     let adapter = workbench.adapter();
     let (mut server, bridge) = workbench.serve_with_bridge(SCENE, &["--give-up", "1"]);
-    let drawing = adapter.is_ok().then(|| {
-        workbench.join(
-            "render",
-            "front",
-            &server,
-            &[
-                "--headless",
-                "--width",
-                "64",
-                "--height",
-                "64",
-                "--give-up",
-                "1",
-            ],
-        )
-    });
+    let options = ["--width", "64", "--height", "64", "--give-up", "1"];
+    let drawing = adapter.is_ok().then(|| draw(&workbench, &server, &options));
     if adapter.is_ok() {
         wait_for("the node to join", JOIN_LIMIT, || {
             server

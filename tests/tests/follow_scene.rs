@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use taut_tests::patience::wait_for;
-use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
+use taut_tests::workbench::{Server, TestWorkbench};
 use toml::{Table, Value};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
@@ -113,9 +113,7 @@ fn a_bridge_follows_to_a_scene_in_which_its_body_starts_elsewhere() {
         let said = bridge.stderr();
         said.contains("joined another scene (edited)").then_some(())
     });
-    bridge.interrupt();
-    let ended = bridge.end(END_LIMIT);
-    assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
+    bridge.leave();
     let report = server.stop();
     assert_eq!(report["penetrations"].as_u64(), Some(0), "{report}");
 }

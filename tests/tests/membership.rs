@@ -4,8 +4,9 @@
 
 use std::time::{Duration, Instant};
 
-use taut_link::{ClientOptions, Role, connect};
-use taut_proto::{InputSample, PoseF64};
+use taut_link::{ClientLink, ClientOptions, Role, connect};
+use taut_network_tests::bench::reading;
+use taut_proto::InputSample;
 use taut_tests::patience::wait_for;
 use taut_tests::process::Process;
 use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
@@ -155,12 +156,21 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
     assert_eq!(frames["mismatches"], 0, "{frames}");
 }
 
-/// Waits until a state says that the hand feels more than a newton.
-fn wait_for_force(runtime: &Runtime, workbench: &TestWorkbench, server: &Server, node: &str) {
+fn observe(
+    runtime: &Runtime,
+    workbench: &TestWorkbench,
+    server: &Server,
+    node: &str,
+) -> ClientLink {
     let options = ClientOptions::new(server.quic.clone(), workbench.key(), Role::Observer, node);
-    let link = runtime
+    runtime
         .block_on(connect(options))
-        .unwrap_or_else(|error| panic!("{error}"));
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Waits until a state says that the hand feels more than a newton.
+fn wait_for_force(runtime: &Runtime, workbench: &TestWorkbench, server: &Server) {
+    let link = observe(runtime, workbench, server, "watcher");
     let mut states = Vec::new();
     wait_for("a force", JOIN_LIMIT, || {
         states.clear();
@@ -172,24 +182,43 @@ fn wait_for_force(runtime: &Runtime, workbench: &TestWorkbench, server: &Server,
     runtime.block_on(link.close());
 }
 
+/// Sends with the keys of an epoch that is over.
+fn send_old(link: &ClientLink) {
+    let before = link.counters();
+    for index in 1..=OLD_DATAGRAMS {
+        link.send_input(&InputSample {
+            sample_time_ns: index,
+            ..reading(index)
+        });
+    }
+    // It says hello now and then, too.
+    assert!(link.counters().packets_sent >= before.packets_sent + OLD_DATAGRAMS);
+}
+
+/// The hand felt both servers, and no force that was too old.
+fn assert_felt_no_old_force(bridge: Process) {
+    let report = bridge.leave_json();
+    assert_eq!(report["sessions"], 2, "{report}");
+    assert!(report["max_force_n"].as_f64() > Some(1.0), "{report}");
+    // The promise holds for a loop that is on time; by how much this one ever was late is in the same report.
+    let age = report["max_force_age_ms"].as_f64().expect("a number");
+    let late = report["period_us"]["max"].as_f64().expect("a number") * 1e-3;
+    println!(
+        "the oldest force was {age:.1} ms older than its command; longest period of the loop {late:.1} ms"
+    );
+    assert!(age > 0.0 && age <= ZERO_FORCE_MS + late + 1.0, "{report}");
+}
+
 #[test]
-fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_next_one() {
+fn a_killed_servers_force_is_gone_and_everybody_joins_the_next_one() {
     let mut workbench = telling_workbench();
     let drawing = draws(&workbench);
     let (mut server, bridge) = workbench.serve_with_bridge(SCENE, &[]);
     let front = drawing.then(|| node(&workbench, "front", &server, &[]));
     let runtime = Runtime::new().expect("a runtime");
-    wait_for_force(&runtime, &workbench, &server, "watcher");
+    wait_for_force(&runtime, &workbench, &server);
     // A client of the old epoch, that keeps its keys.
-    let old = ClientOptions::new(
-        server.quic.clone(),
-        workbench.key(),
-        Role::Observer,
-        "of-the-old-epoch",
-    );
-    let old = runtime
-        .block_on(connect(old))
-        .unwrap_or_else(|error| panic!("{error}"));
+    let old = observe(&runtime, &workbench, &server, "of-the-old-epoch");
     wait_for("a state", JOIN_LIMIT, || {
         (old.counters().states > 0).then_some(())
     });
@@ -211,38 +240,10 @@ fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_n
         );
     }
     // The force comes back by itself: a simulated hand is nobody who could be hurt.
-    wait_for_force(&runtime, &workbench, &again, "watcher");
+    wait_for_force(&runtime, &workbench, &again);
     // The sockets of the old one are open still: what it sends reaches the port of the next server.
-    let before = old.counters();
-    for index in 1..=OLD_DATAGRAMS {
-        old.send_input(&InputSample {
-            sample_time_ns: index,
-            clock_uncertainty_ns: 0,
-            index,
-            pose: PoseF64::IDENTITY,
-            velocity: [0.0; 6],
-            buttons: 0,
-            flags: 0,
-            rendered: [0.0; 6],
-            set_made_ns: 0,
-        });
-    }
-    // It says hello now and then, too.
-    assert!(old.counters().packets_sent >= before.packets_sent + OLD_DATAGRAMS);
-
-    bridge.interrupt();
-    let ended = bridge.end(END_LIMIT);
-    assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
-    let report = ended.json();
-    assert_eq!(report["sessions"], 2, "{report}");
-    assert!(report["max_force_n"].as_f64() > Some(1.0), "{report}");
-    // The promise holds for a loop that is on time; by how much this one ever was late is in the same report.
-    let age = report["max_force_age_ms"].as_f64().expect("a number");
-    let late = report["period_us"]["max"].as_f64().expect("a number") * 1e-3;
-    println!(
-        "the oldest force was {age:.1} ms older than its command; longest period of the loop {late:.1} ms"
-    );
-    assert!(age > 0.0 && age <= ZERO_FORCE_MS + late + 1.0, "{report}");
+    send_old(&old);
+    assert_felt_no_old_force(bridge);
     if let Some(front) = front {
         let report = front.leave();
         assert_eq!(number_after(&report, "sessions: "), 2.0, "{report}");
@@ -283,10 +284,7 @@ fn a_server_that_stops_ends_its_nodes_unless_they_are_to_stay() {
         let report = stays.leave();
         assert_eq!(number_after(&report, "sessions: "), 2.0, "{report}");
     }
-    bridge.interrupt();
-    let ended = bridge.end(END_LIMIT);
-    assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
-    assert_eq!(ended.json()["sessions"], 2);
+    assert_eq!(bridge.leave_json()["sessions"], 2);
     again.stop();
 }
 
