@@ -62,14 +62,99 @@ fn assert_force(what: &str, sample: &Sample, value: f64, depth: f64, rest_distan
     );
 }
 
+/// Nothing but rounding is felt of a force, N, or a torque, N m.
+fn assert_none(what: &str, sample: &Sample, value: f64) {
+    assert!(
+        value.abs() <= NO_FORCE,
+        "{what} {value} at {} s",
+        sample.time
+    );
+}
+
 fn between(samples: &[Sample], from: f64, to: f64) -> impl Iterator<Item = &Sample> {
     samples
         .iter()
         .filter(move |sample| (from..to).contains(&sample.time))
 }
 
+/// (a), (b): the tip, then the side, slides on the top. Nothing along the hole; the full force across, also where the peg goes
+/// from one triangle to the next.
+fn assert_slides_on_the_top(samples: &[Sample], rest: f64) {
+    for sample in between(samples, 0.0, 11.8) {
+        assert_none("F_y", sample, force(sample).y);
+    }
+    // From 1 s to 4.5 s, and from 7.4 s to 11 s, the hand is 6 mm deep. A peg that rolls onto a side between two facets stands
+    // lower by its sagitta, 10 mm (1 - cos 2.5 degrees) = 9.5 um.
+    for sample in between(samples, 1.0, 4.5).chain(between(samples, 7.4, 11.0)) {
+        assert_force("F_z", sample, force(sample).z, DEPTH, rest + 9.6e-6);
+    }
+}
+
+/// (c), (d): each face pushes back and never pulls, the left one in full while the hand is 6 mm deep, the right one until the hole is felt.
+fn assert_faces_push_back(samples: &[Sample], rest: f64) {
+    for sample in between(samples, 12.8, 17.3) {
+        let along = force(sample).y;
+        assert!(along <= NO_FORCE, "F_y {along} at {} s", sample.time);
+    }
+    for sample in between(samples, 14.3, 16.7) {
+        assert_force("-F_y", sample, -force(sample).y, DEPTH, rest);
+    }
+    assert!(between(samples, 19.6, 22.0).all(|sample| force(sample).y >= -NO_FORCE));
+    assert!(between(samples, 20.9, 21.5).all(|sample| force(sample).y > 0.99 * STIFFNESS * DEPTH));
+}
+
+/// (e): 50 mm in and out again, all on the axis of the hole but for a while at depth. The peg touches nothing or the lower
+/// side, which pushes straight up: nothing along the hole, and nothing that twists the round peg, from the mouth on.
+fn assert_goes_in_and_out(samples: &[Sample], rest: f64) {
+    let depths = samples.iter().map(insertion);
+    let deepest = depths.fold(f64::NEG_INFINITY, f64::max);
+    assert!(
+        (0.050 - rest..0.0501).contains(&deepest),
+        "the peg went {deepest} m in"
+    );
+    assert!(
+        insertion(&samples[samples.len() - 1]) < 0.0,
+        "the peg did not come out"
+    );
+    let inserted = |sample: &&Sample| insertion(sample) > 0.0;
+    assert!(
+        between(samples, 22.4, 28.4).filter(inserted).count() > 5000,
+        "the peg was hardly inserted"
+    );
+    for sample in between(samples, 22.4, 28.4).filter(inserted) {
+        let force = force(sample);
+        assert!(
+            force.y.abs() <= NO_AXIAL_FORCE && force.x.abs() <= NO_AXIAL_FORCE,
+            "inserted: {force} at {} s",
+            sample.time
+        );
+        assert_none("inserted: the round peg's torque", sample, torque(sample).y);
+    }
+    // Pressed 2 mm down: the clearance is 0.5 mm, and facets add up to 22 um to that.
+    for sample in between(samples, 25.3, 26.6) {
+        let force = force(sample);
+        assert!(
+            insertion(sample) >= 0.040 && (1.478..=1.515).contains(&force.z),
+            "pressed at depth: F_z {} at {} s",
+            force.z,
+            sample.time
+        );
+    }
+}
+
+/// How far the tip is in the hole, m, measured from the right face.
+fn insertion(sample: &Sample) -> f64 {
+    let at = &sample.god_object.translation;
+    let (tip, beside_the_axis) = (at.y - HALF_LENGTH, at.x.hypot(at.z));
+    if beside_the_axis < 0.002 {
+        HALF_LENGTH - tip
+    } else {
+        f64::NEG_INFINITY
+    }
+}
+
 #[test]
-fn the_peg_goes_into_the_hole_and_out_and_its_axial_force_is_that_of_figure_11() {
+fn the_peg_goes_in_and_out_and_its_axial_force_is_that_of_figure_11() {
     let scene = shipped("peg-in-a-hole");
     assert_eq!(
         (
@@ -83,98 +168,9 @@ fn the_peg_goes_into_the_hole_and_out_and_its_axial_force_is_that_of_figure_11()
         lead(&scene, sampled(&intention(&scene), 1000.0, 0.0, 30.0)).collect();
     assert_apart(&scene, &samples, 5);
     let rest = scene.settings.rest_distance;
-
-    // (a), (b): the tip, then the side, slides on the top. Nothing along the hole; the full force across, also where the peg goes
-    // from one triangle to the next.
-    for sample in between(&samples, 0.0, 11.8) {
-        assert!(
-            force(sample).y.abs() <= NO_FORCE,
-            "F_y {} at {} s",
-            force(sample).y,
-            sample.time
-        );
-    }
-    // From 1 s to 4.5 s, and from 7.4 s to 11 s, the hand is 6 mm deep. A peg that rolls onto a side between two facets stands
-    // lower by its sagitta, 10 mm (1 - cos 2.5 degrees) = 9.5 um.
-    for sample in between(&samples, 1.0, 4.5).chain(between(&samples, 7.4, 11.0)) {
-        assert_force("F_z", sample, force(sample).z, DEPTH, rest + 9.6e-6);
-    }
-
-    // (c): pushes the left face, which pushes back: never positive, the full force while the hand is 6 mm deep.
-    for sample in between(&samples, 12.8, 17.3) {
-        assert!(
-            force(sample).y <= NO_FORCE,
-            "F_y {} at {} s",
-            force(sample).y,
-            sample.time
-        );
-    }
-    for sample in between(&samples, 14.3, 16.7) {
-        assert_force("-F_y", sample, -force(sample).y, DEPTH, rest);
-    }
-
-    // (d): the right face pushes the other way, until the hole is felt.
-    assert!(between(&samples, 19.6, 22.0).all(|sample| force(sample).y >= -NO_FORCE));
-    assert!(between(&samples, 20.9, 21.5).all(|sample| force(sample).y > 0.99 * STIFFNESS * DEPTH));
-
-    // (e): 50 mm in and out again, all on the axis of the hole but for a while at depth. The peg touches nothing or the lower
-    // side, which pushes straight up: nothing along the hole, and nothing that twists the round peg, from the mouth on.
-    let deepest = samples
-        .iter()
-        .map(insertion)
-        .fold(f64::NEG_INFINITY, f64::max);
-    assert!(
-        (0.050 - rest..0.0501).contains(&deepest),
-        "the peg went {deepest} m in"
-    );
-    assert!(
-        insertion(&samples[samples.len() - 1]) < 0.0,
-        "the peg did not come out"
-    );
-    let inserted = |sample: &&Sample| insertion(sample) > 0.0;
-    assert!(
-        between(&samples, 22.4, 28.4).filter(inserted).count() > 5000,
-        "the peg was hardly inserted"
-    );
-    for sample in between(&samples, 22.4, 28.4).filter(inserted) {
-        let (force, torque) = (force(sample), torque(sample));
-        assert!(
-            force.y.abs() <= NO_AXIAL_FORCE && force.x.abs() <= NO_AXIAL_FORCE,
-            "inserted: {force} at {} s",
-            sample.time
-        );
-        assert!(
-            torque.y.abs() <= NO_FORCE,
-            "inserted: the round peg is twisted by {} N m at {} s",
-            torque.y,
-            sample.time
-        );
-    }
-    // Pressed 2 mm down: the clearance is 0.5 mm, and facets add up to 22 um to that.
-    for sample in between(&samples, 25.3, 26.6) {
-        let force = force(sample);
-        assert!(
-            insertion(sample) >= 0.040 && (1.478..=1.515).contains(&force.z),
-            "pressed at depth: F_z {} at {} s",
-            force.z,
-            sample.time
-        );
-    }
-}
-
-/// How far the tip is in the hole, m, measured from the right face.
-fn insertion(sample: &Sample) -> f64 {
-    let tip = sample.god_object.translation.y - HALF_LENGTH;
-    let beside_the_axis = sample
-        .god_object
-        .translation
-        .x
-        .hypot(sample.god_object.translation.z);
-    if beside_the_axis < 0.002 {
-        HALF_LENGTH - tip
-    } else {
-        f64::NEG_INFINITY
-    }
+    assert_slides_on_the_top(&samples, rest);
+    assert_faces_push_back(&samples, rest);
+    assert_goes_in_and_out(&samples, rest);
 }
 
 #[test]
@@ -219,17 +215,10 @@ fn a_sphere_on_a_plane_feels_the_closed_form_force_and_never_loses_it() {
     let rest = scene.settings.rest_distance;
     for sample in &samples {
         let depth = 0.020 - sample.device.translation.z;
-        let (force, torque) = (force(sample), torque(sample));
-        assert!(
-            force.x.abs() <= NO_FORCE && force.y.abs() <= NO_FORCE,
-            "friction: {force} at {} s",
-            sample.time
-        );
-        assert!(
-            torque.norm() <= NO_FORCE,
-            "a sphere on a plane is twisted by {torque} at {} s",
-            sample.time
-        );
+        let force = force(sample);
+        assert_none("friction", sample, force.x);
+        assert_none("friction", sample, force.y);
+        assert_none("a torque on the sphere of", sample, torque(sample).norm());
         if depth > 2.0 * rest {
             assert_force("F_z", sample, force.z, depth, rest);
         } else if depth < -2.0 * rest {
