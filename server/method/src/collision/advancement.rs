@@ -82,7 +82,7 @@ impl PairSearch<'_> {
         if !self.swept.has_only_balls() {
             let moving = MovingPiece::at(self.motion, placement, &pair.on_body, to - start);
             let swept = SweptPair::new(self, pair, &moving, placement, to - start);
-            return swept.step_along_faces().step >= to - start;
+            return swept.is_free(to - start, lately);
         }
         let path = Path::new(self, pair, placement, [from - start, to - start]);
         path.is_free_along(&pair.obstacle_normal, pair)
@@ -104,7 +104,7 @@ impl PairSearch<'_> {
         let mut moving = MovingPiece::at(self.motion, &placement, &pair.on_body, to - from);
         for iteration in 0..self.max_iterations {
             work.advancement_steps += 1;
-            let best = self.best_step(&moving, pair, &placement, to - time);
+            let best = self.best_step(&moving, pair, &placement, to - time, lately, work);
             lately.add(&best.direction);
             let far = best.gap >= self.gaps.stop; // false for NaN
             if iteration == 0 && !far {
@@ -132,11 +132,13 @@ impl PairSearch<'_> {
         pair: &PiecePair,
         placement: &Placement,
         wanted: f64,
+        lately: &Directions,
+        work: &mut Work,
     ) -> SafeStep {
         if self.swept.has_only_balls() {
             moving.best_step(pair, placement, self, wanted)
         } else {
-            SweptPair::new(self, pair, moving, placement, wanted).best_step(wanted)
+            SweptPair::new(self, pair, moving, placement, wanted).best_step(wanted, lately, work)
         }
     }
 
@@ -161,7 +163,9 @@ impl PairSearch<'_> {
         if self.swept.nothing {
             return triangles_intersect(&moving.corners, &pair.on_obstacle);
         }
-        let apart = self.best_step(&moving, pair, placement, f64::INFINITY).gap > 0.0; // false for NaN
+        let (lately, work) = (Directions::default(), &mut Work::default());
+        let best = self.best_step(&moving, pair, placement, f64::INFINITY, &lately, work);
+        let apart = best.gap > 0.0; // false for NaN
         !apart
     }
 }
@@ -169,7 +173,7 @@ impl PairSearch<'_> {
 /// The directions along which pairs were followed last, obstacle frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Directions {
-    newest: ArrayVec<Vector3<f64>, MAX_DIRECTIONS>,
+    pub(super) newest: ArrayVec<Vector3<f64>, MAX_DIRECTIONS>,
     oldest: usize,
 }
 

@@ -14,12 +14,14 @@
 
 use nalgebra::Vector3;
 
-use super::advancement::{PairSearch, PiecePair};
+use super::advancement::{Directions, PairSearch, PiecePair};
 use super::collider::{Disc, Swept};
 use super::fall::time_to_fall;
 use super::gjk::{Core, direction};
 use super::motion::Placement;
 use super::moving_piece::{MovingPiece, SafeStep, support};
+use super::turning::Turning;
+use super::work::Work;
 
 /// A step along the normals of faces and caps that covers this share of what is left is taken without a look at closest points.
 const GOOD_SHARE: f64 = 0.25;
@@ -94,13 +96,27 @@ impl<'a> SweptPair<'a> {
         best
     }
 
-    /// The better of that and the step along the closest points, which cost more: they are asked where the normals allow little of the time that is `left`.
-    pub(super) fn best_step(&self, left: f64) -> SafeStep {
-        let faces = self.step_along_faces();
+    /// Whether the pair is free in the time that is `left` along one of the normals of faces and caps, or a direction along which others were followed.
+    pub(super) fn is_free(&self, left: f64, lately: &Directions) -> bool {
+        let along = |n: &Vector3<f64>| self.safe_step(n).step >= left;
+        self.step_along_faces().step >= left || lately.newest.iter().any(along)
+    }
+
+    /// The best of those and the step along the closest points, which cost more: they are asked where the others allow little of the time that is `left`.
+    pub(super) fn best_step(&self, left: f64, lately: &Directions, work: &mut Work) -> SafeStep {
         let gaps = &self.search.gaps;
-        let good = faces.step >= GOOD_SHARE * left && faces.gap - gaps.stop > gaps.tolerance; // false for NaN
-        if good || self.swept().half_space {
-            return faces;
+        let good = |step: &SafeStep| {
+            step.step >= GOOD_SHARE * left && step.gap - gaps.stop > gaps.tolerance // false for NaN
+        };
+        let mut best = self.step_along_faces();
+        if good(&best) || self.swept().half_space {
+            return best;
+        }
+        for n in &lately.newest {
+            best = best.or(self.safe_step(n));
+            if good(&best) {
+                return best;
+            }
         }
         let body = Core {
             points: self.moving.corners,
@@ -110,8 +126,59 @@ impl<'a> SweptPair<'a> {
             points: self.pair.on_obstacle,
             disc: self.swept().discs[1],
         };
-        let n = direction(&body, &obstacle);
-        faces.or(self.safe_step(&n))
+        let kept = gaps.stop + self.swept().round;
+        let (n, supports) = direction(&body, &obstacle, [kept, gaps.tolerance]);
+        work.advancement_steps += supports;
+        best = best.or(self.safe_step(&n));
+        if good(&best) {
+            return best;
+        }
+        best.or(self.turning_step(&n, left, best.gap - gaps.stop))
+    }
+
+    /// The same along `n` and what it may turn to, where the side of a cylinder lies on something, so much farther away than the gap to stop at.
+    fn turning_step(&self, n: &Vector3<f64>, left: f64, above: f64) -> SafeStep {
+        let mut best = SafeStep::nowhere(n);
+        let discs = [
+            self.disc.as_ref().map(|moving| moving.disc),
+            self.swept().discs[1],
+        ];
+        let all = || discs.iter().flatten();
+        // No disc reaches farther than its radius along any direction; one that lies reaches that far.
+        let over = all().map(|disc| disc.radius * (1.0 - n.cross(&disc.axis).norm()));
+        let lies = over.sum::<f64>() < above; // false for NaN
+        if !lies {
+            return best;
+        }
+        let round = self.swept().round + all().map(|disc| disc.radius).sum::<f64>();
+        let still = &self.pair.on_obstacle;
+        let turning = Turning {
+            moving: self.moving,
+            still,
+            velocity: &self.search.motion.velocity,
+            rate: self.search.motion.rate,
+            left,
+        };
+        let [of_body, of_obstacle] = [(0, &self.moving.corners), (1, still)].map(|(k, piece)| {
+            let sides = [0, 1, 2].map(|i| piece[(i + 1) % 3] - piece[i]);
+            discs[k].map_or(sides, |disc| {
+                [disc.axis, Vector3::zeros(), Vector3::zeros()]
+            })
+        });
+        // A corner of the obstacle lets n turn as it may.
+        let corner = discs[1].is_none().then_some(None);
+        let lines = of_obstacle.into_iter().map(Some).chain(corner);
+        for other in lines {
+            for spin in of_body
+                .iter()
+                .filter_map(|line| turning.spin(n, line, other))
+            {
+                let mut step = turning.safe_step(n, &spin, self.search.gaps.stop + round);
+                step.gap -= round;
+                best = best.or(step);
+            }
+        }
+        best
     }
 
     /// How far in time the body's piece may move so that it stays the gap to stop at above the obstacle's along `n`. NaN goes nowhere.

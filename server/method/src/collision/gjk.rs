@@ -1,6 +1,7 @@
 //! The direction in which two convex pieces are apart, of which one is a cylinder or both are, without balls.
 //!
-//! Nothing depends on its accuracy but progress: every direction gives a valid lower bound of the distance.
+//! Nothing depends on its accuracy but progress: every direction gives a valid lower bound of the distance. So the search ends where more accuracy would
+//! bring an advance no farther.
 //! Source: Gilbert, Johnson, Keerthi 1988.
 
 use nalgebra::{Point3, Vector3};
@@ -12,6 +13,8 @@ use crate::geometry::distance::closest_on_triangle;
 const MAX_SUPPORTS: u32 = 48;
 /// The search ends when upper and lower bound of the distance differ by less than this share of the distance.
 const RELATIVE_ACCURACY: f64 = 1e-6;
+/// A direction along which this share of what is left to the distance to be kept is seen is good enough: an advance makes as much of its way.
+const ENOUGH_SHARE: f64 = 0.9;
 /// Two supports nearer than this, relative to their size, are one.
 const SAME_POINT: f64 = 1e-28;
 
@@ -45,8 +48,13 @@ impl Core {
     }
 }
 
-/// Unit direction from `still` to `mover` along which they are apart; NaN or any where they overlap.
-pub(super) fn direction(mover: &Core, still: &Core) -> Vector3<f64> {
+/// Unit direction from `still` to `mover` along which they are apart, and how many supports were looked at; NaN or any where they overlap. As good as there
+/// is, or good enough: along it they are most of what they are farther apart than the distance to be kept, m, and more than the tolerance.
+pub(super) fn direction(
+    mover: &Core,
+    still: &Core,
+    [kept, tolerance]: [f64; 2],
+) -> (Vector3<f64>, u64) {
     let support = |n: &Vector3<f64>| Point3::from(mover.farthest(&-n) - still.farthest(n));
     let start = mover.points[0] - still.points[0];
     let mut nearest = support(&start).coords;
@@ -55,7 +63,9 @@ pub(super) fn direction(mover: &Core, still: &Core) -> Vector3<f64> {
         count: 1,
     };
     let mut best = (f64::NEG_INFINITY, start / start.norm());
+    let mut supports = 1;
     for _ in 0..MAX_SUPPORTS {
+        supports += 1;
         let length = nearest.norm();
         let n = nearest / length;
         let next = support(&n);
@@ -64,7 +74,9 @@ pub(super) fn direction(mover: &Core, still: &Core) -> Vector3<f64> {
             best = (lower, n);
         }
         let improves = length - lower > RELATIVE_ACCURACY * length; // false for NaN
-        if !improves || simplex.has(&next) {
+        let above = best.0 - kept;
+        let enough = above > tolerance && above >= ENOUGH_SHARE * (length - kept);
+        if !improves || enough || simplex.has(&next) {
             break;
         }
         match simplex.with(next) {
@@ -73,7 +85,7 @@ pub(super) fn direction(mover: &Core, still: &Core) -> Vector3<f64> {
             _ => break,
         }
     }
-    best.1
+    (best.1, supports)
 }
 
 /// A simplex of the difference of the two pieces, nearest to the origin.

@@ -29,6 +29,7 @@ mod processors_tests;
 mod single;
 mod time_of_impact;
 mod turned;
+mod turning;
 mod windows;
 mod work;
 mod workspace;

@@ -45,12 +45,12 @@ pub(super) fn support(n: &Vector3<f64>, [p, q, r]: &[Point3<f64>; 3]) -> f64 {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MovingPiece {
     pub(super) corners: [Point3<f64>; 3],
-    velocities: [Vector3<f64>; 3],
+    pub(super) velocities: [Vector3<f64>; 3],
     /// Half of the accelerations.
-    bends: [Vector3<f64>; 3],
+    pub(super) bends: [Vector3<f64>; 3],
     /// `|w| |w x r_i| H / 6`, H the time that is left.
     remainders: [f64; 3],
-    spin: Vector3<f64>,
+    pub(super) spin: Vector3<f64>,
 }
 
 impl MovingPiece {

@@ -11,7 +11,7 @@ pub struct Work {
     pub triangle_pairs: u64,
     /// Pairs of features (vertex, edge, face) looked at.
     pub feature_pairs: u64,
-    /// Evaluations of the closest points of a moving pair of triangles.
+    /// Evaluations of the closest points of a moving pair of triangles, or of a support of pieces that are no triangles.
     pub advancement_steps: u64,
     /// Gauss projections.
     pub projections: u64,

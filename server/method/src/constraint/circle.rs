@@ -26,8 +26,10 @@ const CROSSINGS: u8 = 1;
 const FIXED: u8 = 3;
 /// A cylinder nearer to upright than this has no lowest point, as a sine.
 const UPRIGHT_SINE: f64 = 1e-12;
-/// Halvings of a bracket: ends at rounding.
+/// Most places looked at between two ends; some eight are enough.
 const MAX_REFINEMENTS: u32 = 60;
+/// An angle that moves by no more than this is found, rad.
+const ANGLE_ROUNDING: f64 = 1e-14;
 
 /// A rim, in the common frame.
 #[derive(Clone, Copy, Debug)]
@@ -100,10 +102,18 @@ impl Circle {
         }
     }
 
-    /// Whether some of these points lie on either side of its plane, or within `reach` (m) of it: otherwise nothing between them is as near.
-    pub(super) fn is_level_with(&self, points: &[Point3<f64>], reach: f64) -> bool {
-        let heights = || points.iter().map(|p| self.outward.dot(&(p - self.center)));
-        heights().any(|height| height >= -reach) && heights().any(|height| height <= reach)
+    /// Whether something between these points may be within `reach` (m) of it: they lie on either side of its plane, or as near to that, and not all
+    /// farther inside it.
+    pub(super) fn may_be_near(&self, points: &[Point3<f64>], reach: f64) -> bool {
+        let offsets = || points.iter().map(|p| p - self.center);
+        let heights = || offsets().map(|offset| self.outward.dot(&offset));
+        let inside = (self.radius - reach).max(0.0);
+        let far_out = |(offset, height): (Vector3<f64>, f64)| {
+            offset.norm_squared() - height * height >= inside * inside
+        };
+        heights().any(|height| height >= -reach)
+            && heights().any(|height| height <= reach)
+            && offsets().zip(heights()).any(far_out)
     }
 
     pub(super) fn beside_point(&self, b: &Point) -> Option<Row> {
@@ -125,7 +135,7 @@ impl Circle {
         let nearest = from + along * share(&self.center).clamp(0.0, length);
         let within = b.skin.round + reach.within;
         let near = (nearest - self.center).norm() <= self.radius + within;
-        if !near || !self.is_level_with(&b.ends, within) {
+        if !near || !self.may_be_near(&b.ends, within) {
             return;
         }
         // Two minima lie on either side of where the circle is the farthest along the segment.
@@ -267,27 +277,69 @@ impl Circle {
         };
         let mut before = slope(0.0);
         for k in 0..RIM_POINTS {
-            let (mut low, mut high) = (angle_of(k), angle_of(k + 1));
-            let after = slope(high);
+            let ends = [angle_of(k), angle_of(k + 1)];
+            let after = slope(ends[1]);
             if before < 0.0 && after >= 0.0 {
-                for _ in 0..MAX_REFINEMENTS {
-                    let middle = f64::midpoint(low, high);
-                    if middle <= low || middle >= high {
-                        break;
-                    }
-                    if slope(middle) < 0.0 {
-                        low = middle;
-                    } else {
-                        high = middle;
-                    }
-                }
-                found(&self.at(start, f64::midpoint(low, high).sin_cos()));
+                let angle = zero_between(ends, [before, after], slope);
+                found(&self.at(start, angle.sin_cos()));
             }
             before = after;
         }
     }
 }
 
+/// Where a function of an angle crosses zero between two ends, from below: false position, where the value at an end that stays counts half.
+/// Source: Dowell, Jarratt 1971 (the Illinois method).
+fn zero_between(mut ends: [f64; 2], mut values: [f64; 2], of: impl Fn(f64) -> f64) -> f64 {
+    let (mut angle, mut replaced) = (f64::INFINITY, None);
+    for _ in 0..MAX_REFINEMENTS {
+        let share = values[0] / (values[0] - values[1]);
+        let next = ends[0] + (ends[1] - ends[0]) * share;
+        let moves = (next - angle).abs() > ANGLE_ROUNDING; // false for NaN
+        if !moves {
+            break;
+        }
+        angle = next;
+        let value = of(angle);
+        let side = usize::from(value >= 0.0);
+        (ends[side], values[side]) = (angle, value);
+        if replaced.replace(side) == Some(side) {
+            values[1 - side] *= 0.5;
+        }
+    }
+    angle
+}
+
 fn angle_of(place: u8) -> f64 {
     std::f64::consts::TAU * f64::from(place) / f64::from(RIM_POINTS)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::zero_between;
+
+    #[test]
+    fn a_zero_between_two_ends_is_found_in_a_few_looks() {
+        for k in 0..1000 {
+            let u = f64::from(k);
+            // Slopes of rims over lines: two waves, of once and twice the angle.
+            let (zero, bend) = (0.39 * (1.3 * u).sin().abs(), 0.8 * (0.7 * u).sin());
+            let wave = |angle: f64| angle.sin() + bend * (0.5 * (2.0 * angle).sin());
+            let looks = Cell::new(0);
+            let of = |angle: f64| {
+                looks.set(looks.get() + 1);
+                wave(angle - zero)
+            };
+            let ends = [zero - 0.39 + 1e-3 * u.cos().abs(), zero + 0.2];
+            let values = ends.map(|angle| wave(angle - zero));
+            if !(values[0] < 0.0 && values[1] >= 0.0) {
+                continue;
+            }
+            let found = zero_between(ends, values, of);
+            assert!((found - zero).abs() < 1e-13, "{k}: {found} {zero}");
+            assert!(looks.get() <= 14, "{k}: {} looks", looks.get());
+        }
+    }
 }

@@ -197,7 +197,7 @@ fn for_pieces(
         let triangle = placed.triangle(t);
         let on_obstacle = (!mesh_moves).then_some(&triangle);
         let near = |x: &&Element| match x {
-            Element::Circle(rim) => rim.is_level_with(&triangle.corners, within),
+            Element::Circle(rim) => rim.may_be_near(&triangle.corners, within),
             _ => true,
         };
         let near: ArrayVec<&Element, 5> = elements.iter().filter(near).collect();
