@@ -17,6 +17,7 @@ mod hand_traces;
 mod jamming;
 mod machined_parts;
 mod peg_clearances;
+mod random_scenes;
 mod scales;
 mod still_hand;
 mod thin_walls;
