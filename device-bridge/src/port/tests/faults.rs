@@ -42,7 +42,7 @@ fn faults() -> impl Strategy<Value = Vec<(Fault, u64, f64)>> {
 }
 
 /// A fault while it lasts.
-struct Spell {
+struct Episode {
     fault: Fault,
     begun: Duration,
     newtons: f64,
@@ -104,24 +104,24 @@ impl Trial {
     }
 
     /// What comes next from the device and from whoever commands.
-    fn inputs(&mut self, spell: &Spell) -> (Answer, Command) {
+    fn inputs(&mut self, episode: &Episode) -> (Answer, Command) {
         let (now, speed) = (self.stage.now + self.stage.period, self.stage.speed);
         let mut sample = sample_at(now, speed);
-        let wrench = Vector6::new(spell.newtons, 3.0, 0.0, 0.0, 0.3, 0.0);
+        let wrench = Vector6::new(episode.newtons, 3.0, 0.0, 0.0, 0.3, 0.0);
         let mut command = Command::on_set(now - self.age, wrench);
-        match spell.fault {
+        match episode.fault {
             Fault::Origin => sample.pose = Pose::identity(),
-            Fault::Frozen => sample.pose = sample_at(spell.begun, speed).pose,
+            Fault::Frozen => sample.pose = sample_at(episode.begun, speed).pose,
             Fault::Nan => sample.pose = Pose::translation(f64::NAN, 0.0, 0.0),
             Fault::Jump => sample.pose = Pose::translation(9.0, 0.0, 0.0),
             Fault::TimeBack => sample.time -= ms(300),
             Fault::Unplugged => {
-                let age = now - spell.begun;
+                let age = now - episode.begun;
                 return (Err(DeviceFault::Lost { age }), command);
             }
             Fault::WrenchNan => command.wrench[3] = f64::NAN,
             Fault::CommandsStop => command.origin = self.good_command,
-            Fault::ConstraintsStop => command.constraint_age = now - spell.begun,
+            Fault::ConstraintsStop => command.constraint_age = now - episode.begun,
             Fault::CommandsAhead => command.origin = now + ms(50),
             Fault::Paused => command.paused = true,
             Fault::Disarm => self.stage.port.ask_to_disarm(),
@@ -131,40 +131,46 @@ impl Trial {
     }
 
     /// Whether the port has to take this pose.
-    fn is_good(&mut self, pose: Option<Pose>, spell: &Spell) -> bool {
+    fn is_good(&mut self, pose: Option<Pose>, episode: &Episode) -> bool {
         let moved = pose != self.last_pose;
         self.last_pose = pose;
         self.stood += self.stage.period;
         if moved {
             self.stood = Duration::ZERO;
         }
-        match spell.fault {
+        match episode.fault {
             // A device that has stood somewhere else for long enough is there.
             Fault::Origin | Fault::Jump => self.stood > ms(100),
             // It froze when it moved last. One that stands still after another fault rests: where it froze before, it comes back somewhere else.
-            Fault::Frozen => moved || spell.after_fault && self.stage.now > spell.begun + ms(100),
+            Fault::Frozen => {
+                moved || episode.after_fault && self.stage.now > episode.begun + ms(100)
+            }
             Fault::Nan | Fault::TimeBack | Fault::Unplugged => false,
             _ => true,
         }
     }
 
-    fn tick(&mut self, spell: &mut Spell) -> Result<(), TestCaseError> {
-        let (answer, command) = self.inputs(spell);
-        let sample_is_good = self.is_good(answer.map(|sample| sample.pose).ok(), spell);
-        let is_first = self.stage.now == spell.begun;
+    fn tick(&mut self, episode: &mut Episode) -> Result<(), TestCaseError> {
+        let (answer, command) = self.inputs(episode);
+        let sample_is_good = self.is_good(answer.map(|sample| sample.pose).ok(), episode);
+        let is_first = self.stage.now == episode.begun;
         let report = self.stage.tick(answer, Some(command));
-        spell.after_fault |= is_first && self.stage.port.fault().is_some();
+        episode.after_fault |= is_first && self.stage.port.fault().is_some();
         if sample_is_good {
             self.good_sample = self.stage.now;
         }
-        match spell.fault {
+        match episode.fault {
             Fault::WrenchNan | Fault::CommandsStop | Fault::CommandsAhead => {}
             _ => self.good_command = self.stage.now - self.age,
         }
-        self.assert_promises(&report, spell)
+        self.assert_promises(&report, episode)
     }
 
-    fn assert_promises(&mut self, report: &TickReport, spell: &Spell) -> Result<(), TestCaseError> {
+    fn assert_promises(
+        &mut self,
+        report: &TickReport,
+        episode: &Episode,
+    ) -> Result<(), TestCaseError> {
         let felt = report.wrench;
         prop_assert!(felt.iter().all(|x| x.is_finite()));
         for (start, bounds) in [0, 3].into_iter().zip(self.bounds) {
@@ -175,13 +181,13 @@ impl Trial {
             let most = bounds.own + if armed { bounds.explained } else { 0.0 };
             prop_assert!(part(felt - self.before) <= most * (1.0 + 1e-9));
         }
-        let (fault, now) = (spell.fault, self.stage.now);
+        let (fault, now) = (episode.fault, self.stage.now);
         let silent = now - self.good_sample.min(self.good_command);
         if silent >= SafetySettings::ZERO_AFTER {
             prop_assert_eq!(felt, Vector6::zeros(), "{:?} for {:?}", fault, silent);
         }
         let wished = matches!(fault, Fault::Paused | Fault::Disarm);
-        if wished && now - spell.begun >= SafetySettings::ZERO_AFTER {
+        if wished && now - episode.begun >= SafetySettings::ZERO_AFTER {
             prop_assert_eq!(felt, Vector6::zeros(), "{:?}", fault);
         }
         self.before = felt;
@@ -208,9 +214,9 @@ proptest! {
         let mut after_fault = false;
         for (fault, duration_ms, newtons) in sequence {
             let begun = trial.stage.now;
-            let mut spell = Spell { fault, begun, newtons, after_fault };
+            let mut episode = Episode { fault, begun, newtons, after_fault };
             while trial.stage.now < begun + ms(duration_ms) {
-                trial.tick(&mut spell)?;
+                trial.tick(&mut episode)?;
             }
             after_fault = trial.stage.port.fault().is_some();
         }
