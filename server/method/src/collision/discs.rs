@@ -99,7 +99,9 @@ impl<'a> SweptPair<'a> {
     /// Whether the pair is free in the time that is `left` along one of the normals of faces and caps, or a direction along which others were followed.
     pub(super) fn is_free(&self, left: f64, lately: &Directions) -> bool {
         let along = |n: &Vector3<f64>| self.safe_step(n).step >= left;
-        self.step_along_faces().step >= left || lately.newest.iter().any(along)
+        // A half-space is bounded along its normal alone.
+        let others = !self.swept().half_space;
+        self.step_along_faces().step >= left || others && lately.newest.iter().any(along)
     }
 
     /// The best of those and the step along the closest points, which cost more: they are asked where the others allow little of the time that is `left`.
@@ -129,7 +131,8 @@ impl<'a> SweptPair<'a> {
         let kept = gaps.stop + self.swept().round;
         let (n, supports) = direction(&body, &obstacle, [kept, gaps.tolerance]);
         work.advancement_steps += supports;
-        best = best.or(self.safe_step(&n));
+        // First, so that neighbours are tried along it.
+        best = self.safe_step(&n).or(best);
         if good(&best) {
             return best;
         }
