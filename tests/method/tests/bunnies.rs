@@ -5,11 +5,12 @@ use taut_method_tests::variants::measure::quantile;
 
 /// As many hands, since where one presses, a set in a hundred may lack a row, and another's lacks none.
 const HANDS: u64 = 4;
-/// Most that their sets are off by at the 98th and 99th percentile and in the worst, of the slow and the fast slide.
-const BOUNDS: [[f64; 3]; 2] = [[0.005, 0.005, 0.05], [0.01, 0.02, 0.25]];
+/// Most that their sets are off by at the 98th and 99th percentile and in the worst, of the slow and the fast slide. The worst of fifty hands is
+/// 0.7 and 9.4 %.
+const BOUNDS: [[f64; 3]; 2] = [[1e-3, 1e-3, 0.02], [1e-3, 1e-3, 0.1]];
 
-/// Where a hand goes farther in an update than the work of a collection reaches, up to 3 mm, the set has rows that a search along its motions found.
-/// Without that the forces were off by up to 41 and 63 %.
+/// Where a hand goes up to 3 mm in an update, the set has what a collection reaches that looks as far as its work allows, and what a search along the
+/// set's motions finds beyond. Without the search the forces were off by up to 41 and 63 %, without such a reach by 8 and 97 %.
 #[test]
 fn a_bunny_that_slides_over_another_is_felt_as_by_every_pair() {
     let Some(bunny) = load("bunny_27k.ply") else {

@@ -13,7 +13,7 @@ use pulp::{Simd, WithSimd};
 
 use super::beyond::Beyond;
 use super::buckets::Buckets;
-use super::descent::{AtRest, Opened, open};
+use super::descent::{AT_ONCE, AtRest, Opened, open};
 use super::facing_volumes::FacingVolumes;
 use super::turned::TurnedNodes;
 use super::work::Work;
@@ -123,32 +123,49 @@ where
         let (body, obstacle) = trees;
         bands.clear();
         let mut room = bands.push(0, (ROOT, ROOT));
-        while let Some((band, (a, b))) = bands.pop(SIGNED_BANDS) {
-            // Not before its turn: most that wait never have one.
-            if !wanted(body.owned(a), obstacle.owned(b)) {
-                continue;
-            }
-            if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
-                work.triangle_pairs += 1;
-                if !visit(t, s, work) {
-                    return Some(band);
+        let mut opened = [(Opened::nothing(Beyond::NONE), [OUT_OF_QUESTION; LANES]); AT_ONCE];
+        loop {
+            // Of one band.
+            let (mut band, mut count) = (SIGNED_BANDS, 0);
+            while count < AT_ONCE
+                && let Some((earliest, (a, b))) = bands.pop(band)
+            {
+                band = earliest;
+                // Not before its turn: most that wait never have one.
+                if !wanted(body.owned(a), obstacle.owned(b)) {
+                    continue;
                 }
-                continue;
-            }
-            work.node_pairs += 1;
-            let opened = open(&AtRest, trees, volumes, turned, (a, b));
-            let own = order.bands(&opened);
-            opened.for_each(opened.found.near, |pair, lane| {
-                let own = own[lane as usize % LANES] as usize;
-                if own < SIGNED_BANDS {
-                    room &= bands.push(own.max(band), pair);
+                if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b))
+                {
+                    work.triangle_pairs += 1;
+                    if !visit(t, s, work) {
+                        return Some(band);
+                    }
+                    continue;
                 }
-            });
+                work.node_pairs += 1;
+                let (pair, own) = &mut opened[count];
+                *pair = open(&AtRest, trees, volumes, turned, (a, b));
+                *own = order.bands(pair);
+                count += 1;
+            }
+            if band == SIGNED_BANDS {
+                return None;
+            }
+            // Turned round, so that what was opened first is gone on with first. Across a band instead of down into it, a search that is given up ends
+            // with leaves all over the surface: forces between conforming parts were then off by up to 27 instead of 4 %.
+            for (pair, own) in opened[..count].iter().rev() {
+                pair.for_each(pair.found.near, |pair, lane| {
+                    let own = own[lane as usize % LANES] as usize;
+                    if own < SIGNED_BANDS {
+                        room &= bands.push(own.max(band), pair);
+                    }
+                });
+            }
             if !room {
                 return Some(band);
             }
         }
-        None
     }
 }
 

@@ -3,7 +3,7 @@
 use super::facing_volumes::FacingVolumes;
 use super::one_to_eight::{OfEight, One, OneToEight};
 use super::single::{dot, larger};
-use super::turned::aside;
+use super::turned::shares;
 use crate::geometry::lanes::{LANES, Lanes};
 
 /// How far one volume and each of eight are apart.
@@ -41,16 +41,17 @@ pub(super) fn beyond(pairs: &OneToEight) -> Beyond {
         let [(height_a, extent_a), (height_b, extent_b)] = one.along_axes(&it, &d);
         let off_a = height_a.abs() - extent_a - volumes.stray;
         let off_b = height_b.abs() - extent_b - volumes.stray;
-        let mut off = larger(boxes, larger(off_a, off_b));
-        let (narrow_a, margin_a) = narrowed(volumes, &it);
-        let mut apart = one.faces_away(&it);
-        // What faces lies along a normal: in front, and as little aside as the cone is narrow.
-        let behind_a = -height_a - extent_a - volumes.bare_stray;
-        let behind_b = -height_b - extent_b - volumes.bare_stray;
-        apart |= (narrow_a & (behind_a > 0.0)) | ((one.cosine > 0.0) & (behind_b > 0.0));
         let [of_a, of_b] = asides(&one, &it, &d).map(|of| of - volumes.bare_stray);
-        apart |= (of_a > margin_a) | (of_b > one.margin_aside);
-        off = larger(off, larger(of_a, of_b) - volumes.margin);
+        let [rise, per_aside] = widened_shares(volumes, &it);
+        let aside = larger(of_a * per_aside, of_b * one.per_aside);
+        let off = larger(larger(boxes, larger(off_a, off_b)), aside - volumes.margin);
+        // No gap so wide has room below the other's top.
+        let gap = larger(off + volumes.margin, 0.0);
+        let top_a = height_a + extent_a + volumes.bare_stray;
+        let top_b = height_b + extent_b + volumes.bare_stray;
+        let over_a = (rise > 0.0) & (gap * rise > top_a);
+        let over_b = (one.rise > 0.0) & (gap * one.rise > top_b);
+        let apart = one.faces_away(&it) | over_a | over_b;
         let off = if apart { f32::INFINITY } else { off };
         by.0[k] = off;
         near |= if off > 0.0 { 0 } else { 1 << k }; // near for NaN
@@ -58,18 +59,13 @@ pub(super) fn beyond(pairs: &OneToEight) -> Beyond {
     Beyond { by, near }
 }
 
-/// Whether the cone of one of the eight says where in front is, widened as it is, and the margin across its axis, m.
+/// [`shares`] of one of the eight, whose cone is widened by what the other's is.
 #[inline(always)]
-fn narrowed(volumes: &FacingVolumes, it: &OfEight) -> (bool, f32) {
-    let [cos_w, sin_w] = volumes.turn;
-    let (cos, sin) = (
-        it.cosine.mul_add(cos_w, -(it.sine * sin_w)),
-        it.sine.mul_add(cos_w, it.cosine * sin_w),
-    );
-    let narrow = (cos > 0.0) & (sin >= 0.0);
-    (
-        narrow,
-        volumes.margin * if narrow { aside(sin) } else { 1.0 },
+fn widened_shares(volumes: &FacingVolumes, it: &OfEight) -> [f32; 2] {
+    let [cos, sin] = volumes.turn;
+    shares(
+        it.cosine.mul_add(cos, -(it.sine * sin)),
+        it.sine.mul_add(cos, it.cosine * sin),
     )
 }
 

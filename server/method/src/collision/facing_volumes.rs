@@ -18,8 +18,8 @@
 //! when the angle between a and a' exceeds the sum of the cones.
 //!
 //! At rest more is known: what faces over a distance g lies along a normal, so within the cone of either volume. Seen along its axis it
-//! is in front, and across the axis at most `g` times the sine of the cone aside: the tangents of a volume are axes of separation with a
-//! margin that is narrow where the surface is smooth.
+//! is at least g times the cone's cosine in front, and across the axis at most g times its sine aside. So what lies aside bounds g from below, as
+//! boxes and slabs do, and how high the volumes reach bounds it from above: where no g is left nothing faces.
 //!
 //! **Rounding** is relative to the volumes, not to the meshes: a gap of micrometres on a part of a metre is told from none. Centres are taken from the
 //! origins of their nodes, and how far these are apart is worked out in double precision. Let R be the radius of the volume that a node is below, and rho

@@ -44,7 +44,8 @@ impl OneToEight<'_> {
             slab: one(&turned.slab),
             cosine: one(&turned.cosine),
             sine: one(&turned.sine),
-            margin_aside: one(&turned.margin_aside),
+            per_aside: one(&turned.per_aside),
+            rise: one(&turned.rise),
         }
     }
 }
@@ -63,7 +64,8 @@ pub(super) struct One {
     pub(super) slab: f32,
     pub(super) cosine: f32,
     pub(super) sine: f32,
-    pub(super) margin_aside: f32,
+    pub(super) per_aside: f32,
+    pub(super) rise: f32,
 }
 
 /// One of the eight, as [`WideNode`] has it.

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::facing_volumes::{FacingVolumes, Side};
-use super::single::{apply, dot, product, sum};
+use super::single::{apply, dot, product, smaller, sum};
 use crate::geometry::lanes::{LANES, Lanes};
 use crate::geometry::wide_node::WideNode;
 use crate::geometry::wide_tree::{Child, WideTree};
@@ -34,8 +34,9 @@ pub(super) struct Turned {
     pub(super) slab: Lanes,
     pub(super) cosine: Lanes,
     pub(super) sine: Lanes,
-    /// Margin along the tangents, m: what faces these features is no farther aside.
-    pub(super) margin_aside: Lanes,
+    /// What faces these features is at least so many times as far away as aside of the axis; and so much of the distance lies along it, none for a wide cone.
+    pub(super) per_aside: Lanes,
+    pub(super) rise: Lanes,
     /// Of volumes of a motion, otherwise without meaning: the path, what their points stray by along the axis, and the path of the farthest about the centre.
     pub(super) sweep: [Lanes; 3],
     pub(super) stray_along_axis: Lanes,
@@ -147,7 +148,8 @@ impl Turned {
             slab: zero,
             cosine: zero,
             sine: zero,
-            margin_aside: zero,
+            per_aside: zero,
+            rise: zero,
             sweep: [zero; 3],
             stray_along_axis: zero,
             turning: zero,
@@ -200,7 +202,9 @@ impl Turned {
             self.slab.0[k] = slab;
             self.cosine.0[k] = cosine;
             self.sine.0[k] = sine;
-            self.margin_aside.0[k] = volumes.margin * if cosine > 0.0 { aside(sine) } else { 1.0 };
+            let [rise, per_aside] = shares(cosine, sine);
+            self.rise.0[k] = rise;
+            self.per_aside.0[k] = per_aside;
             if !MOVES {
                 continue;
             }
@@ -220,9 +224,15 @@ impl Turned {
     }
 }
 
-/// The share of a distance that may lie across the axis of a cone whose sine this is.
+/// Of a distance to what faces features whose normals are in a cone: the share that lies along the axis at least, and the distance for each metre
+/// across. 0 and 1 for a cone of a right angle or more, which says nothing of either. Without branches.
 #[inline(always)]
-pub(super) fn aside(sine: f32) -> f32 {
-    let share = sine + FOOT_SHARE;
-    if share < 1.0 { share } else { 1.0 }
+pub(super) fn shares(cosine: f32, sine: f32) -> [f32; 2] {
+    let narrow = (cosine > FOOT_SHARE) & (sine >= 0.0);
+    let across = if narrow {
+        smaller(sine + FOOT_SHARE, 1.0)
+    } else {
+        1.0
+    };
+    [if narrow { cosine - FOOT_SHARE } else { 0.0 }, 1.0 / across]
 }

@@ -18,7 +18,7 @@ impl GodObject {
         reduction.begin(at, distance);
         self.set.gap_min = f64::INFINITY;
         let share = self.share();
-        let (mut looked_at, mut left, mut even) = (0, self.settings.look_ahead_pairs, None);
+        let (mut left, mut even) = (self.settings.look_ahead_pairs, None);
         self.note_order(at);
         for place in 0..self.order.len() {
             let index = self.order[place];
@@ -32,14 +32,11 @@ impl GodObject {
                 share
             };
             let collected = self.candidates_of(index, reduction, at, (distance, pairs), work);
-            looked_at += collected.looked_at;
             left = left.saturating_sub(collected.looked_at.min(pairs));
             self.looked_at[index] = collected.looked_at;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
             reduction.offer(at, index, &self.contacts, &collected);
         }
-        let looked_at = looked_at + self.given.looked_at;
-        self.afford_look_ahead(distance, looked_at + u64::from(reduction.was_given_up()));
         // Known rows may be nearer than what a collection that was given up has found.
         let gap_min = reduction.gap_min(at, work).min(self.given.gap_min);
         self.set.gap_min = self.set.gap_min.min(gap_min);

@@ -164,9 +164,8 @@ impl GodObject {
             self.given.keep_nearest(room);
         }
         self.given.looked_at = work.triangle_pairs + work.feature_pairs - pairs_before;
-        if self.reduction.is_none() {
-            self.afford_look_ahead(distance, self.given.looked_at);
-        } else if let (Some(at), Some(reduction)) = (self.place(), &mut self.reduction) {
+        self.afford_look_ahead(distance, self.given.looked_at);
+        if let (Some(at), Some(reduction)) = (self.place(), &mut self.reduction) {
             reduction.give(&at, &self.given.rows, most);
         }
     }

@@ -56,7 +56,8 @@ impl GodObject {
         }
     }
 
-    /// Takes note of what a collection within `distance` (m) cost, in pairs of triangles and of features.
+    /// Takes note of what a collection within `distance` (m) of every row cost, in pairs of triangles and of features. Where rows are chosen, a collection
+    /// has its own bound: it reaches as far as the work allows and no less.
     pub(super) fn afford_look_ahead(&mut self, distance: f64, pairs: u64) {
         if pairs > self.settings.look_ahead_pairs {
             let beyond = (distance - self.settings.activation_distance).max(0.0);

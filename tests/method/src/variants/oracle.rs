@@ -1,7 +1,9 @@
 //! The projection on every facing pair within reach, as the answer that a choice of rows is held against.
 
 use god_object::collision::{CollisionWorkspace, Work};
-use god_object::constraint::{Contact, collect_contacts, contact_jacobian};
+use god_object::constraint::{
+    ConstraintSet, Contact, Feature, FeaturePair, collect_contacts, contact_jacobian,
+};
 use god_object::quasi_statics::{HalfSpace, Metric, Projector, SolverKind};
 use god_object::spatial::{angular, at_reference_point, linear, pose_difference};
 use god_object::{GodObject, Pose, Settings, Vector6, World};
@@ -64,15 +66,19 @@ impl Oracle {
         let metric = body
             .metric(settings.rotation_metric, god_object.pose())
             .expect("a metric");
-        let every = self.contacts.iter().map(|c| Row {
-            normal: c.normal,
-            point: c.point_on_obstacle,
-            gap: c.gap,
-        });
+        let set = god_object.constraint_set();
+        let others = self
+            .contacts
+            .iter()
+            .filter(|c| !has_plane(set, &c.features))
+            .map(|c| Row {
+                normal: c.normal,
+                point: c.point_on_obstacle,
+                gap: c.gap,
+            });
         // Of the rows that were published some hold though their features face no more: they slid into a hollow.
         let published = || {
-            let rows = god_object.constraint_set().constraints.iter();
-            rows.map(|c| Row {
+            set.constraints.iter().map(|c| Row {
                 normal: c.normal,
                 point: c.point,
                 gap: c.gap,
@@ -81,7 +87,7 @@ impl Oracle {
         let full = project(
             &mut self.projector,
             &mut self.rows,
-            every.chain(published()),
+            others.chain(published()),
             &metric,
             &wanted,
             &center,
@@ -125,6 +131,15 @@ impl Oracle {
             assert!(!collected.truncated, "the oracle holds every pair");
         }
     }
+}
+
+/// Whether the set says which plane parts this pair of corners: any in both their cones does, and the oracle holds the set to the one that it names.
+fn has_plane(set: &ConstraintSet, pair: &FeaturePair) -> bool {
+    let is_face = |feature| matches!(feature, Feature::Face(_));
+    let is_edge = |feature| matches!(feature, Feature::Edge(_));
+    let (a, b) = (pair.on_body, pair.on_obstacle);
+    let are_corners = !(is_face(a) || is_face(b) || is_edge(a) && is_edge(b));
+    are_corners && set.constraints.iter().any(|row| row.features == *pair)
 }
 
 struct Row {
