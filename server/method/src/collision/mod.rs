@@ -50,5 +50,7 @@ pub(crate) use displacements::{MAX_MOTIONS, Motions};
 pub(crate) use facing_volumes::{FacingVolumes, Side};
 pub(crate) use motion::Placement;
 pub(crate) use obstacle_way::{ObstacleWay, time_of_impact_of_obstacle};
+#[cfg(test)]
+pub(crate) use processors_tests::bumpy_ball;
 pub(crate) use turned::TurnedNodes;
 pub(crate) use workspace::{MAX_IMPLIED, MAX_WITNESSES};

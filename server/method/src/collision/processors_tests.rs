@@ -21,7 +21,7 @@ fn levels() -> Vec<Arch> {
 }
 
 /// A ball of about 0.1 m with bumps, closed and turned outward.
-fn bumpy_ball(rings: u32, sides: u32) -> Mesh {
+pub(crate) fn bumpy_ball(rings: u32, sides: u32) -> Mesh {
     let mut vertices = vec![Point3::new(0.0, 0.0, 0.1), Point3::new(0.0, 0.0, -0.1)];
     for ring in 1..rings {
         for side in 0..sides {

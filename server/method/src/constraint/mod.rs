@@ -3,6 +3,8 @@
 mod arc;
 mod circle;
 mod collect;
+#[cfg(test)]
+mod collect_tests;
 mod cones;
 mod contact;
 mod cores;
