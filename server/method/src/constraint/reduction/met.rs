@@ -121,15 +121,7 @@ fn for_normals(mesh: &Mesh, feature: Feature, mut each: impl FnMut(&Vector3<f64>
 /// Whether a direction is in the normal cone of a feature, in the mesh's frame: to the tolerance that faces have.
 fn holds(mesh: &Mesh, feature: Feature, direction: &Vector3<f64>) -> bool {
     match feature {
-        // The normals of an edge are across it: a plane aslant along it has the edge on both sides.
-        Feature::Edge(e) => {
-            let [p, q] = mesh.edges()[e as usize]
-                .vertices
-                .map(|v| mesh.vertices()[v as usize]);
-            let along = q - p;
-            direction.dot(&along).abs() <= LOOK_AHEAD_TILT * along.norm()
-                && is_in_edge_cone(mesh, e, direction, LOOK_AHEAD_TILT)
-        }
+        Feature::Edge(e) => is_in_edge_cone(mesh, e, direction, LOOK_AHEAD_TILT),
         Feature::Vertex(v) => is_in_vertex_cone(mesh, v, direction, LOOK_AHEAD_TILT),
         _ => false,
     }
