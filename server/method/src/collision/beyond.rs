@@ -42,15 +42,15 @@ pub(super) fn beyond(pairs: &OneToEight) -> Beyond {
         let off_a = height_a.abs() - extent_a - volumes.stray;
         let off_b = height_b.abs() - extent_b - volumes.stray;
         let [of_a, of_b] = asides(&one, &it, &d).map(|of| of - volumes.bare_stray);
-        let [rise, per_aside] = widened_shares(volumes, &it);
-        let aside = larger(of_a * per_aside, of_b * one.per_aside);
+        let [rise_per_gap, gap_per_aside] = widened_shares(volumes, &it);
+        let aside = larger(of_a * gap_per_aside, of_b * one.gap_per_aside);
         let off = larger(larger(boxes, larger(off_a, off_b)), aside - volumes.margin);
-        // No gap so wide has room below the other's top.
+        // A contact with a gap so wide would lie above all of the other volume.
         let gap = larger(off + volumes.margin, 0.0);
         let top_a = height_a + extent_a + volumes.bare_stray;
         let top_b = height_b + extent_b + volumes.bare_stray;
-        let over_a = (rise > 0.0) & (gap * rise > top_a);
-        let over_b = (one.rise > 0.0) & (gap * one.rise > top_b);
+        let over_a = (rise_per_gap > 0.0) & (gap * rise_per_gap > top_a);
+        let over_b = (one.rise_per_gap > 0.0) & (gap * one.rise_per_gap > top_b);
         let apart = one.faces_away(&it) | over_a | over_b;
         let off = if apart { f32::INFINITY } else { off };
         by.0[k] = off;

@@ -44,8 +44,8 @@ impl OneToEight<'_> {
             slab: one(&turned.slab),
             cosine: one(&turned.cosine),
             sine: one(&turned.sine),
-            per_aside: one(&turned.per_aside),
-            rise: one(&turned.rise),
+            gap_per_aside: one(&turned.gap_per_aside),
+            rise_per_gap: one(&turned.rise_per_gap),
         }
     }
 }
@@ -64,8 +64,8 @@ pub(super) struct One {
     pub(super) slab: f32,
     pub(super) cosine: f32,
     pub(super) sine: f32,
-    pub(super) per_aside: f32,
-    pub(super) rise: f32,
+    pub(super) gap_per_aside: f32,
+    pub(super) rise_per_gap: f32,
 }
 
 /// One of the eight, as [`WideNode`] has it.

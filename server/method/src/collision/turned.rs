@@ -34,9 +34,10 @@ pub(super) struct Turned {
     pub(super) slab: Lanes,
     pub(super) cosine: Lanes,
     pub(super) sine: Lanes,
-    /// What faces these features is at least so many times as far away as aside of the axis; and so much of the distance lies along it, none for a wide cone.
-    pub(super) per_aside: Lanes,
-    pub(super) rise: Lanes,
+    /// How far what faces these features is for each metre that it lies aside of the axis, and how high above them for each metre of that gap, at least:
+    /// see [`shares`].
+    pub(super) gap_per_aside: Lanes,
+    pub(super) rise_per_gap: Lanes,
     /// Of volumes of a motion, otherwise without meaning: the path, what their points stray by along the axis, and the path of the farthest about the centre.
     pub(super) sweep: [Lanes; 3],
     pub(super) stray_along_axis: Lanes,
@@ -148,8 +149,8 @@ impl Turned {
             slab: zero,
             cosine: zero,
             sine: zero,
-            per_aside: zero,
-            rise: zero,
+            gap_per_aside: zero,
+            rise_per_gap: zero,
             sweep: [zero; 3],
             stray_along_axis: zero,
             turning: zero,
@@ -202,9 +203,9 @@ impl Turned {
             self.slab.0[k] = slab;
             self.cosine.0[k] = cosine;
             self.sine.0[k] = sine;
-            let [rise, per_aside] = shares(cosine, sine);
-            self.rise.0[k] = rise;
-            self.per_aside.0[k] = per_aside;
+            let [rise_per_gap, gap_per_aside] = shares(cosine, sine);
+            self.rise_per_gap.0[k] = rise_per_gap;
+            self.gap_per_aside.0[k] = gap_per_aside;
             if !MOVES {
                 continue;
             }
@@ -224,8 +225,8 @@ impl Turned {
     }
 }
 
-/// Of a distance to what faces features whose normals are in a cone: the share that lies along the axis at least, and the distance for each metre
-/// across. 0 and 1 for a cone of a right angle or more, which says nothing of either. Without branches.
+/// Of the gap to what faces features whose normals are in a cone: the share that lies along its axis at least, and the least gap for each metre across
+/// the axis. 0 and 1 for a cone of a right angle or more, which says nothing of either. Without branches.
 #[inline(always)]
 pub(super) fn shares(cosine: f32, sine: f32) -> [f32; 2] {
     let narrow = (cosine > FOOT_SHARE) & (sine >= 0.0);

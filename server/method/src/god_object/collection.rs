@@ -22,8 +22,6 @@ pub(super) struct GivenRows {
     pub(super) gap_min: f64,
     pub(super) truncated: bool,
     pub(super) complete_within: f64,
-    /// Pairs of triangles and of features that were looked at.
-    pub(super) looked_at: u64,
 }
 
 impl GivenRows {
@@ -38,7 +36,6 @@ impl GivenRows {
             gap_min: f64::INFINITY,
             truncated: false,
             complete_within: f64::INFINITY,
-            looked_at: 0,
         }
     }
 
@@ -163,8 +160,8 @@ impl GodObject {
             }
             self.given.keep_nearest(room);
         }
-        self.given.looked_at = work.triangle_pairs + work.feature_pairs - pairs_before;
-        self.afford_look_ahead(distance, self.given.looked_at);
+        let looked_at = work.triangle_pairs + work.feature_pairs - pairs_before;
+        self.afford_look_ahead(distance, looked_at);
         if let (Some(at), Some(reduction)) = (self.place(), &mut self.reduction) {
             reduction.give(&at, &self.given.rows, most);
         }

@@ -74,6 +74,10 @@ impl GodObject {
                 this.collect_candidates(reduction, at, this.collected_within, work);
                 this.answers(reduction, at, &motion, Purpose::Motion, work);
             }
+            let of = (at, &this.surfaces(None) as &dyn Surfaces);
+            if reduction.meet_corners(of, unconstrained, Purpose::Motion, |way| *way, work) {
+                this.answers(reduction, at, &motion, Purpose::Motion, work);
+            }
         });
         self.write_set();
     }
@@ -127,16 +131,12 @@ impl GodObject {
         self.complete_for_force(&probes[..asked], work);
         let met = self.with_reduction(|this, reduction, at| {
             let continued = |way: &Vector6| this.continued(way, reach);
-            reduction.meet_corners((at, &this.surfaces(None)), &probes[1], continued, work)
+            let of = (at, &this.surfaces(None) as &dyn Surfaces);
+            reduction.meet_corners(of, &probes[1], Purpose::Force, continued, work)
         });
-        if met == Some(true) {
-            if all != Some(true) {
-                // The rows of the other probes are there, and no corner asks for more of them.
-                self.complete_for_force(&probes[..LEADING_MOTIONS], work);
-            }
-            self.with_reduction(|this, reduction, at| {
-                reduction.forget_corners((at, &this.surfaces(None)));
-            });
+        if met == Some(true) && all != Some(true) {
+            // The rows of the other probes are there, and no corner asks for more of them.
+            self.complete_for_force(&probes[..LEADING_MOTIONS], work);
         }
         if let Some(reduction) = &mut self.reduction {
             reduction.retire();

@@ -1,18 +1,19 @@
 //! The projection on every facing pair within reach, as the answer that a choice of rows is held against.
 
 use god_object::collision::{CollisionWorkspace, Work};
-use god_object::constraint::{
-    ConstraintSet, Contact, Feature, FeaturePair, collect_contacts, contact_jacobian,
-};
+use god_object::constraint::{Contact, Feature, collect_contacts, contact_jacobian};
 use god_object::quasi_statics::{HalfSpace, Metric, Projector, SolverKind};
 use god_object::spatial::{angular, at_reference_point, linear, pose_difference};
-use god_object::{GodObject, Pose, Settings, Vector6, World};
+use god_object::{GodObject, Mesh, Pose, Settings, Vector6, World};
 use nalgebra::{Point3, Vector3};
 
 /// Most facing pairs within reach.
 const MOST_PAIRS: usize = 1 << 18;
 /// Forces below this are not compared relatively, N.
 const LEAST_FORCE: f64 = 0.5;
+/// A plane in the normal cones of two corners may leave them by as much as a row of edges may, as a sine, and pass their points at this distance, m.
+const TILT: f64 = 0.02 + 1e-6;
+const GAP_TOLERANCE: f64 = 1e-9;
 
 /// How far a published set is from what every pair says.
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,7 +71,7 @@ impl Oracle {
         let others = self
             .contacts
             .iter()
-            .filter(|c| !has_plane(set, &c.features))
+            .filter(|c| !is_parted(world, god_object, c))
             .map(|c| Row {
                 normal: c.normal,
                 point: c.point_on_obstacle,
@@ -133,13 +134,52 @@ impl Oracle {
     }
 }
 
-/// Whether the set says which plane parts this pair of corners: any in both their cones does, and the oracle holds the set to the one that it names.
-fn has_plane(set: &ConstraintSet, pair: &FeaturePair) -> bool {
+/// Whether the set has this pair of corners by a plane that parts them: through the points, in both normal cones. Any such plane does, so the oracle holds
+/// the set to the one that it names.
+fn is_parted(world: &World, god_object: &GodObject, contact: &Contact) -> bool {
+    let pair = &contact.features;
     let is_face = |feature| matches!(feature, Feature::Face(_));
     let is_edge = |feature| matches!(feature, Feature::Edge(_));
     let (a, b) = (pair.on_body, pair.on_obstacle);
-    let are_corners = !(is_face(a) || is_face(b) || is_edge(a) && is_edge(b));
-    are_corners && set.constraints.iter().any(|row| row.features == *pair)
+    if is_face(a) || is_face(b) || is_edge(a) && is_edge(b) {
+        return false;
+    }
+    let index = usize::from(pair.obstacle);
+    let (Some(pose), Some(obstacle)) = (
+        god_object.obstacle_poses().nth(index),
+        world.obstacles.get(index),
+    ) else {
+        return false;
+    };
+    let apart = contact.point_on_body - contact.point_on_obstacle;
+    let mut rows = god_object.constraint_set().constraints.iter();
+    rows.any(|row| {
+        row.features == *pair
+            && (row.gap - row.normal.dot(&apart)).abs() < GAP_TOLERANCE
+            && is_in_cone(&obstacle.mesh, pose, b, &row.normal)
+            && is_in_cone(&world.body.mesh, god_object.pose(), a, &-row.normal)
+    })
+}
+
+/// Whether nothing of the mesh beside a vertex or an edge rises in a direction of the world.
+fn is_in_cone(mesh: &Mesh, pose: &Pose, feature: Feature, direction: &Vector3<f64>) -> bool {
+    let direction = pose.rotation.inverse() * direction;
+    let beside = |from: u32, to: &[u32]| {
+        to.iter().filter(|v| **v != from).all(|v| {
+            let side = mesh.vertices()[*v as usize] - mesh.vertices()[from as usize];
+            direction.dot(&side) <= TILT * side.norm() // false for NaN
+        })
+    };
+    match feature {
+        Feature::Vertex(v) => beside(v, mesh.neighbours(v)),
+        Feature::Edge(e) => {
+            let edge = &mesh.edges()[e as usize];
+            let corners = edge.faces.map(|t| mesh.triangles()[t as usize]);
+            let [p, q] = edge.vertices;
+            [p, q].map(|end| corners.iter().all(|of| beside(end, of))) == [true; 2]
+        }
+        _ => false,
+    }
 }
 
 struct Row {

@@ -38,6 +38,15 @@ pub(super) struct Candidates {
     processor: Arch,
 }
 
+/// One of them: the contact where it was collected, and its rows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stored {
+    contact: Contact,
+    jacobian: Vector6,
+    felt: Vector6,
+    nearer: f64,
+}
+
 impl Candidates {
     pub(super) fn with_capacity(limit: usize) -> Self {
         Self {
@@ -155,19 +164,41 @@ impl Candidates {
         }
     }
 
-    /// Another row of the same features takes the place of a candidate, at the pose where they were collected.
-    pub(super) fn replace(&mut self, k: usize, row: &Known) {
-        self.contacts[k] = row.contact;
-        self.gap[k] = row.contact.gap;
-        for (column, x) in self.jacobian.iter_mut().zip(row.jacobian.iter()) {
-            column[k] = *x;
+    /// Another row of the same features takes the place of a candidate, which is given back.
+    pub(super) fn exchange(&mut self, k: usize, stored: Stored) -> Stored {
+        let Stored {
+            contact,
+            jacobian,
+            felt,
+            nearer,
+        } = stored;
+        let exchange = |columns: &mut [Vec<f64>; 6], row: Vector6| {
+            let each = columns.iter_mut().zip(row.iter());
+            // Of the felt rows there may be none.
+            let before = each
+                .map(|(column, x)| column.get_mut(k).map_or(*x, |it| std::mem::replace(it, *x)));
+            Vector6::from_iterator(before)
+        };
+        self.gap[k] = contact.gap + jacobian.dot(&self.moved);
+        Stored {
+            contact: std::mem::replace(&mut self.contacts[k], contact),
+            jacobian: exchange(&mut self.jacobian, jacobian),
+            felt: exchange(&mut self.felt, felt),
+            nearer: self
+                .nearer
+                .get_mut(k)
+                .map_or(nearer, |it| std::mem::replace(it, nearer)),
         }
-        // Of shaded surfaces and of those that move.
-        for (column, x) in self.felt.iter_mut().zip(row.felt.iter()) {
-            column.get_mut(k).into_iter().for_each(|felt| *felt = *x);
-        }
-        if let Some(nearer) = self.nearer.get_mut(k) {
-            *nearer = row.nearer;
+    }
+
+    /// A row of the present pose as it is stored: its gap is carried back to where the others were collected, so that it is true here.
+    pub(super) fn stored(&self, row: &Known) -> Stored {
+        let gap = row.contact.gap - row.jacobian.dot(&self.moved);
+        Stored {
+            contact: Contact { gap, ..row.contact },
+            jacobian: row.jacobian,
+            felt: row.felt,
+            nearer: row.nearer,
         }
     }
 

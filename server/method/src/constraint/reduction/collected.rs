@@ -51,6 +51,7 @@ impl RowReduction {
         self.truncated = false;
         self.outdated = false;
         self.gone.fill(0.0);
+        self.forget_corners();
         self.candidates.clear(&at.reference);
         self.served = f64::INFINITY;
     }

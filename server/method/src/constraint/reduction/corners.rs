@@ -1,10 +1,11 @@
-//! Pairs of corners in the way of the device: each counts by the face that the body would meet.
+//! Pairs of corners in the way of a motion: each counts by the plane that the body would meet last.
 
 use super::RowReduction;
 use super::at::{At, Purpose, Surfaces};
+use super::candidates::Stored;
 use super::grow::Wished;
 use super::met::{are_corners, clearance, met};
-use super::row::Known;
+use super::row::{Known, face};
 use crate::collision::Work;
 use crate::constraint::Contact;
 use crate::quasi_statics::Projection;
@@ -16,8 +17,8 @@ pub(super) struct Corners {
     known: Vec<Known>,
     /// Gaps of the candidates among them, m.
     gaps: Vec<f64>,
-    /// Place and contact as it was collected.
-    replaced: Vec<(u32, Contact)>,
+    /// Place, and what was collected.
+    replaced: Vec<(u32, Stored)>,
 }
 
 impl Corners {
@@ -31,46 +32,45 @@ impl Corners {
 }
 
 impl RowReduction {
-    /// Where a pair of corners holds back a device that goes by `motion`, lets each in its way count by the face that the body would meet, for the force;
-    /// whether that changed a row. `continued` is a way as far as the device may have gone by the next set. At the pose where the candidates were
-    /// collected.
+    /// Where a pair of corners holds back `motion`, lets each in its way count by the plane that the body would meet last; whether that changed a row.
+    /// `continued` is a way as far as the motion may go on until rows are read off the pairs again: at the next pose.
     pub(crate) fn meet_corners(
         &mut self,
         of: (&At, &dyn Surfaces),
         motion: &Vector6,
+        purpose: Purpose,
         continued: impl Fn(&Vector6) -> Vector6,
         work: &mut Work,
     ) -> bool {
-        if !self
-            .known
-            .iter()
-            .any(|row| are_corners(&row.contact.features))
-        {
+        let mut rows = self.known.iter();
+        if !rows.any(|row| are_corners(&row.contact.features)) {
             return false;
         }
-        let held = self.complete_for_force(of, &continued(motion), work);
+        let held = self.complete_alone(of, &continued(motion), purpose, work);
         let held = held.iter().flat_map(|projection| &projection.active);
         let mut holding = held.filter_map(|row| self.known.get(row.row as usize));
         if !holding.any(|row| are_corners(&row.contact.features)) {
             return false;
         }
+        self.forget_corners();
         self.set_corners_aside();
         // What holds the body elsewhere leads it past some of them.
-        let answers = self.complete_for_force(of, motion, work);
+        let answers = self.complete_alone(of, motion, purpose, work);
         let mut ways = answers.iter().map(|answer| continued(&answer.acceleration));
-        ways.any(|way| self.bring_corners_back(of, &way))
+        ways.any(|way| self.bring_corners_back(of, &way, work))
     }
 
-    fn complete_for_force(
+    fn complete_alone(
         &mut self,
         of: (&At, &dyn Surfaces),
         motion: &Vector6,
+        purpose: Purpose,
         work: &mut Work,
     ) -> Option<Projection> {
         let wished = Wished {
             motions: &[*motion],
             turning: 0,
-            purpose: Purpose::Force,
+            purpose,
         };
         self.complete(of, &wished, work).pop()
     }
@@ -92,23 +92,32 @@ impl RowReduction {
     }
 
     /// Whether some now count by another plane.
-    fn bring_corners_back(&mut self, of: (&At, &dyn Surfaces), way: &Vector6) -> bool {
+    fn bring_corners_back(
+        &mut self,
+        of: (&At, &dyn Surfaces),
+        way: &Vector6,
+        work: &mut Work,
+    ) -> bool {
         let (at, surfaces) = of;
         let mut changed = false;
-        let instead = |contact: &Contact| {
+        let mut instead = |contact: &Contact| {
             // A shaded surface has its own normals.
-            let counts = clearance(of, contact, way) < at.rest_distance
+            let counts = clearance(of, contact, way) < at.rest_distance - at.tolerance
                 && surfaces.shading_normal(contact).is_none();
-            counts.then(|| met(of, contact, way)).flatten()
+            // As it is, and not to first order or by the plane of a motion before.
+            let contact = counts.then(|| face(at, &contact.features, false, work))?;
+            let m = met(of, &contact?, way);
+            m
         };
         for (place, gap) in self.corners.gaps.drain(..).enumerate() {
             let k = self.candidates.corners[place];
             self.candidates.gap[k as usize] = gap;
             let contact = self.candidates.contacts[k as usize];
-            if let Some(met) = instead(&contact) {
-                self.corners.replaced.push((k, contact));
+            if let Some(met) = instead(&Contact { gap, ..contact }) {
                 let row = Known::of(&met, surfaces, &at.center());
-                self.candidates.replace(k as usize, &row);
+                let row = self.candidates.stored(&row);
+                let collected = self.candidates.exchange(k as usize, row);
+                self.corners.replaced.push((k, collected));
             }
         }
         while let Some(row) = self.corners.known.pop() {
@@ -130,10 +139,9 @@ impl RowReduction {
     }
 
     /// The candidates are again what was collected.
-    pub(crate) fn forget_corners(&mut self, (at, surfaces): (&At, &dyn Surfaces)) {
-        for (k, contact) in self.corners.replaced.drain(..) {
-            let row = Known::of(&contact, surfaces, &at.center());
-            self.candidates.replace(k as usize, &row);
+    pub(super) fn forget_corners(&mut self) {
+        for (k, collected) in self.corners.replaced.drain(..) {
+            self.candidates.exchange(k as usize, collected);
         }
     }
 }

@@ -19,7 +19,7 @@ use crate::world::{Body, Obstacle, Surface, World};
 const GAP: f64 = 1e-3;
 const REST: f64 = 1e-5;
 
-struct Plain;
+pub(super) struct Plain;
 
 impl Surfaces for Plain {
     fn shade(&self) -> bool {

@@ -1,4 +1,4 @@
-//! The face that a motion would meet, where a corner faces an edge or another corner.
+//! The plane that a motion would meet last, where a corner faces an edge or another corner.
 //!
 //! | symbol | name in code | unit   | meaning                                                     |
 //! |--------|--------------|--------|-------------------------------------------------------------|
@@ -7,8 +7,8 @@
 //!
 //! Such a pair has no normal of its own. Every plane through its points whose normal is in both cones parts the bodies there, and a body is free as long as
 //! it is outside one of these planes. That of the nearest points, across their difference, lies in the way of corners that pass each other. A straight motion
-//! gets inside where it crosses the last of the planes, and that is one at the end of the cones, as those of faces are: a plane between two others is
-//! crossed before one of them is.
+//! gets inside where it crosses the last of the planes, and that is one at an end of what the cones have in common, as a plane between two others is
+//! crossed before one of them is: it is a face's, or lies along an edge of either.
 
 use nalgebra::Vector3;
 
@@ -38,7 +38,7 @@ pub(super) fn clearance(
     contact.gap - surfaces.nearer(contact) + jacobian(contact, &at.center()).dot(motion)
 }
 
-/// A contact of corners with the plane of a face that `motion` crosses after its own, the last of them; `None` where there is none.
+/// A contact of corners with the plane that `motion` crosses last, where that is after its own; `None` where there is none.
 pub(super) fn met(
     (at, surfaces): (&At, &dyn Surfaces),
     contact: &Contact,
@@ -64,48 +64,56 @@ pub(super) fn met(
     };
     let mut latest = crossed(contact);
     let mut last = None;
-    let mut consider = |plane: Contact| {
+    let (on_both, difference) = (
+        contact.point_on_obstacle,
+        contact.point_on_body - contact.point_on_obstacle,
+    );
+    // Turning the body turns the plane of its face about the obstacle's point, and its own point about the plane of an obstacle's face.
+    let mut consider = |normal: Vector3<f64>, lever: Vector3<f64>| {
+        let gap = normal.dot(&difference);
+        let parts = gap >= 0.0 // false for NaN
+            && holds(body, on_body, &-(at.pose.rotation.inverse() * normal))
+            && holds(mesh, on_obstacle, &(pose.rotation.inverse() * normal));
+        if !parts {
+            return;
+        }
+        let point_on_obstacle = on_both + (lever - normal * normal.dot(&lever));
+        let plane = Contact {
+            point_on_obstacle,
+            point_on_body: point_on_obstacle + normal * gap,
+            normal,
+            gap,
+            ..*contact
+        };
         let crossed = crossed(&plane);
-        if plane.gap >= 0.0 && crossed > latest {
+        if crossed > latest {
             (latest, last) = (crossed, Some(plane));
         }
     };
-    let difference = contact.point_on_body - contact.point_on_obstacle;
     for_normals(mesh, on_obstacle, |normal| {
-        let normal = pose.rotation * normal;
-        let gap = normal.dot(&difference);
-        if holds(body, on_body, &-(at.pose.rotation.inverse() * normal)) {
-            consider(Contact {
-                point_on_obstacle: contact.point_on_body - normal * gap,
-                normal,
-                gap,
-                ..*contact
-            });
-        }
+        consider(pose.rotation * normal, difference);
     });
     for_normals(body, on_body, |normal| {
-        let normal = -(at.pose.rotation * normal);
-        let gap = normal.dot(&difference);
-        if holds(mesh, on_obstacle, &(pose.rotation.inverse() * normal)) {
-            consider(Contact {
-                point_on_body: contact.point_on_obstacle + normal * gap,
-                normal,
-                gap,
-                ..*contact
-            });
-        }
+        consider(-(at.pose.rotation * normal), Vector3::zeros());
+    });
+    for_sides(body, on_body, |of_body| {
+        let of_body = at.pose.rotation * of_body;
+        for_sides(mesh, on_obstacle, |of_obstacle| {
+            let of_obstacle = pose.rotation * of_obstacle;
+            let across = of_body.cross(&of_obstacle);
+            // Where the line of one is nearest to that of the other.
+            let along = difference.cross(&of_body).dot(&-across) / across.norm_squared();
+            for normal in [across, -across] {
+                consider(normal.normalize(), of_obstacle * along);
+            }
+        });
     });
     last
 }
 
-/// Normals of the faces at a feature that are in its normal cone, in the mesh's frame.
+/// Normals of the faces at a feature, in the mesh's frame.
 fn for_normals(mesh: &Mesh, feature: Feature, mut each: impl FnMut(&Vector3<f64>)) {
-    let mut of_face = |face: u32| {
-        let normal = mesh.face_normal(face);
-        if holds(mesh, feature, normal) {
-            each(normal);
-        }
-    };
+    let mut of_face = |face: u32| each(mesh.face_normal(face));
     match feature {
         Feature::Edge(e) => mesh.edges()[e as usize].faces.into_iter().for_each(of_face),
         Feature::Vertex(v) => {
@@ -118,10 +126,34 @@ fn for_normals(mesh: &Mesh, feature: Feature, mut each: impl FnMut(&Vector3<f64>
     }
 }
 
+/// The edge, or those at the vertex, in the mesh's frame.
+fn for_sides(mesh: &Mesh, feature: Feature, mut each: impl FnMut(&Vector3<f64>)) {
+    let apart = |from: u32, to: u32| mesh.vertices()[to as usize] - mesh.vertices()[from as usize];
+    match feature {
+        Feature::Edge(e) => {
+            let [p, q] = mesh.edges()[e as usize].vertices;
+            each(&apart(p, q));
+        }
+        Feature::Vertex(v) => {
+            let neighbours = mesh.neighbours(v).iter();
+            neighbours.for_each(|w| each(&apart(v, *w)));
+        }
+        _ => {}
+    }
+}
+
 /// Whether a direction is in the normal cone of a feature, in the mesh's frame: to the tolerance that faces have.
 fn holds(mesh: &Mesh, feature: Feature, direction: &Vector3<f64>) -> bool {
     match feature {
-        Feature::Edge(e) => is_in_edge_cone(mesh, e, direction, LOOK_AHEAD_TILT),
+        // The normals of an edge are across it: a plane aslant along it has the edge on both sides.
+        Feature::Edge(e) => {
+            let [p, q] = mesh.edges()[e as usize]
+                .vertices
+                .map(|v| mesh.vertices()[v as usize]);
+            let along = q - p;
+            direction.dot(&along).abs() <= LOOK_AHEAD_TILT * along.norm()
+                && is_in_edge_cone(mesh, e, direction, LOOK_AHEAD_TILT)
+        }
         Feature::Vertex(v) => is_in_vertex_cone(mesh, v, direction, LOOK_AHEAD_TILT),
         _ => false,
     }

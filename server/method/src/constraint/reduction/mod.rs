@@ -33,6 +33,8 @@ mod grow;
 #[cfg(test)]
 mod grow_tests;
 mod met;
+#[cfg(test)]
+mod met_tests;
 mod neighbours;
 mod row;
 
@@ -174,6 +176,7 @@ impl RowReduction {
         for pair in &left {
             self.follow((at, surfaces), pair, work);
         }
+        self.forget_corners();
         self.candidates.move_to(&at.reference);
         if let Some(witness) = witness {
             self.take_witness((at, surfaces), witness, work);
@@ -182,6 +185,7 @@ impl RowReduction {
 
     /// The body has made a motion together with the obstacles that the candidates are of.
     pub(crate) fn go_along(&mut self, motion: &Pose) {
+        self.forget_corners();
         self.candidates.go_along(motion);
     }
 
@@ -201,6 +205,7 @@ impl RowReduction {
             row.felt = felt(&row.contact, surfaces, &center);
             row.nearer = surfaces.nearer(&row.contact);
         }
+        self.forget_corners();
         self.candidates.set_surfaces(&center, surfaces);
     }
 
