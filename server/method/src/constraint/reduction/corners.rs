@@ -106,8 +106,7 @@ impl RowReduction {
                 && surfaces.shading_normal(contact).is_none();
             // As it is, and not to first order or by the plane of a motion before.
             let contact = counts.then(|| face(at, &contact.features, false, work))?;
-            let m = met(of, &contact?, way);
-            m
+            met(of, &contact?, way)
         };
         for (place, gap) in self.corners.gaps.drain(..).enumerate() {
             let k = self.candidates.corners[place];
