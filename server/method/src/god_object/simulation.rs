@@ -67,7 +67,7 @@ pub struct GodObject {
     pub(super) last_stop: Option<usize>,
     /// Distance within which the present set has every row, m.
     pub(super) collected_within: f64,
-    /// Longest look-ahead that the cost of the last collections of every row allows, m.
+    /// Longest look-ahead that the last collections' cost allows, where rows are not chosen, m.
     pub(super) affordable: f64,
     /// Finds rows as they are needed; `None` where every pair is collected.
     pub(super) reduction: Option<Box<RowReduction>>,

@@ -95,6 +95,20 @@ fn pairs(mesh: &Mesh) -> Vec<FeaturePair> {
         .collect()
 }
 
+/// With these candidates, and no row yet.
+pub(super) fn reduction_of(at: &At, contacts: &[Contact]) -> RowReduction {
+    let mut reduction = RowReduction::with_capacity(contacts.len(), &at.world);
+    let collected = Collected {
+        truncated: false,
+        complete_within: 1.0,
+        looked_at: 0,
+        gap_min: 0.0,
+    };
+    reduction.begin(at, 1.0);
+    reduction.offer(at, 0, contacts, &collected);
+    reduction
+}
+
 #[test]
 fn a_row_behind_many_candidates_that_face_no_more_is_found() {
     let at = block_on_block(1e-7);
@@ -116,15 +130,7 @@ fn a_row_behind_many_candidates_that_face_no_more_is_found() {
     contacts.sort_by(|a, b| a.gap.total_cmp(&b.gap));
     let stale = contacts.iter().filter(|c| c.gap == 0.0).count();
     assert!(stale > 2 * MAX_STALE as usize && stale < contacts.len());
-    let mut reduction = RowReduction::with_capacity(contacts.len(), &at.world);
-    let collected = Collected {
-        truncated: false,
-        complete_within: 1.0,
-        looked_at: 0,
-        gap_min: 0.0,
-    };
-    reduction.begin(&at, 1.0);
-    reduction.offer(&at, 0, &contacts, &collected);
+    let mut reduction = reduction_of(&at, &contacts);
 
     let here = block_on_block(0.0);
     reduction.move_to((&here, &Plain), None, work);

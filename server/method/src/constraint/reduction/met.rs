@@ -64,12 +64,10 @@ pub(super) fn met(
     };
     let mut latest = crossed(contact);
     let mut last = None;
-    let (on_both, difference) = (
-        contact.point_on_obstacle,
-        contact.point_on_body - contact.point_on_obstacle,
-    );
-    // Turning the body turns the plane of its face about the obstacle's point, and its own point about the plane of an obstacle's face.
-    let mut consider = |normal: Vector3<f64>, lever: Vector3<f64>| {
+    let difference = contact.point_on_body - contact.point_on_obstacle;
+    // The row acts at the obstacle's point moved by `offset` within the plane: there a turn of the body changes the gap as it does that of this plane. An
+    // obstacle's face stays, so the row acts below the body's point; a face of the body turns with it, so the row acts at the obstacle's point.
+    let mut consider = |normal: Vector3<f64>, offset: Vector3<f64>| {
         let gap = normal.dot(&difference);
         let parts = gap >= 0.0 // false for NaN
             && holds(body, on_body, &-(at.pose.rotation.inverse() * normal))
@@ -77,7 +75,7 @@ pub(super) fn met(
         if !parts {
             return;
         }
-        let point_on_obstacle = on_both + (lever - normal * normal.dot(&lever));
+        let point_on_obstacle = contact.point_on_obstacle + offset - normal * normal.dot(&offset);
         let plane = Contact {
             point_on_obstacle,
             point_on_body: point_on_obstacle + normal * gap,

@@ -7,11 +7,11 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use super::RowReduction;
 use super::at::{At, Place, Purpose};
 use super::grow::Wished;
-use super::grow_tests::Plain;
+use super::grow_tests::{Plain, reduction_of};
 use super::met::{are_corners, met};
 use super::row::{face, jacobian};
 use crate::collision::{Work, bumpy_ball};
-use crate::constraint::{Collected, Contact, Feature, FeaturePair};
+use crate::constraint::{Contact, Feature, FeaturePair};
 use crate::geometry::Mesh;
 use crate::settings::RotationMetric;
 use crate::spatial::{Pose, advance_pose, six};
@@ -251,13 +251,7 @@ fn a_motion_that_a_pair_of_corners_holds_goes_on_by_the_plane_that_it_meets_last
             &((aside * 2.0 - first.normal) * (4.0 * first.gap)),
             &Vector3::zeros(),
         );
-        let mut reduction = RowReduction::with_capacity(contacts.len(), &at.world);
-        let collected = Collected {
-            truncated: false,
-            complete_within: 1.0,
-            looked_at: 0,
-            gap_min: 0.0,
-        };
+        let mut reduction = reduction_of(&at, &contacts);
         let work = &mut Work::default();
         let wished = Wished {
             motions: &[way],
@@ -268,8 +262,6 @@ fn a_motion_that_a_pair_of_corners_holds_goes_on_by_the_plane_that_it_meets_last
             let answers = reduction.complete((&at, &Plain), &wished, work);
             at.metric.norm(&(answers[0].acceleration - way))
         };
-        reduction.begin(&at, 1.0);
-        reduction.offer(&at, 0, &contacts, &collected);
         let held = short_of(&mut reduction, work);
         if !reduction.meet_corners((&at, &Plain), &way, Purpose::Motion, |way| *way, work) {
             continue;
