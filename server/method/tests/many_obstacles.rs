@@ -48,7 +48,8 @@ struct Course {
 }
 
 impl Course {
-    fn among(obstacles: Vec<Obstacle>) -> Self {
+    /// Where the hand goes up to so far from the middle, m; the body is free for 4 mm.
+    fn among(obstacles: Vec<Obstacle>, far: f64) -> Self {
         let body = Body {
             mesh: ball(),
             primitive: None,
@@ -68,7 +69,7 @@ impl Course {
         };
         for update in 0..UPDATES {
             let u = 0.05 * f64::from(update);
-            let place = Vector3::new(0.02 * u.cos(), 0.02 * u.sin(), 0.012 * (0.7 * u).sin());
+            let place = Vector3::new(u.cos(), u.sin(), 0.6 * (0.7 * u).sin()) * far;
             let device = Pose::new(place, Vector3::new(0.1 * u, -0.05 * u, 0.0));
             let report = god_object.step(&device, None);
             course.work += report.work;
@@ -102,38 +103,42 @@ fn alike(a: u64, b: u64) -> bool {
     a.abs_diff(b) <= a / 20
 }
 
+/// Pressed in by no more than a pebble's radius: deeper, a ball on a ball tips over to either side, and rounding says to which.
 #[test]
 fn forces_and_work_do_not_depend_on_the_order_of_the_obstacles() {
     let near = pebbles(0.03);
-    let course = Course::among(near.clone());
-    let largest = course
-        .wrenches
-        .iter()
-        .map(Vector6::norm)
-        .fold(0.0, f64::max);
-    assert!(largest > 3.0, "{largest} N");
-    for places in [1, PEBBLES / 2] {
-        let mut other = near.clone();
-        other.rotate_left(places);
-        if places == 1 {
-            other.reverse();
+    for (far, at_least) in [(0.006, 0.5), (0.008, 0.9), (0.010, 1.4)] {
+        let course = Course::among(near.clone(), far);
+        let largest = course
+            .wrenches
+            .iter()
+            .map(Vector6::norm)
+            .fold(0.0, f64::max);
+        assert!(largest > at_least, "{largest} N");
+        for places in [1, 7, 13, PEBBLES / 2] {
+            let mut other = near.clone();
+            other.rotate_left(places);
+            if places < PEBBLES / 2 {
+                other.reverse();
+            }
+            let other = Course::among(other, far);
+            // A row that an answer violates by less than the tolerance of rows may be known or not.
+            assert!(course.off(&other) < 1e-4, "{:e} N", course.off(&other));
+            assert_eq!(course.substeps, other.substeps);
+            let (work, others) = (course.near_work(), other.near_work());
+            for (a, b) in work.into_iter().zip(others) {
+                assert!(alike(a, b), "{work:?} {others:?}");
+            }
+            let [a, b] = [course.work, other.work].map(|work| work.node_pairs);
+            assert!(alike(a, b), "{a} {b}");
         }
-        let other = Course::among(other);
-        assert!(course.off(&other) < 1e-6, "{:e} N", course.off(&other));
-        assert_eq!(course.substeps, other.substeps);
-        let (work, others) = (course.near_work(), other.near_work());
-        for (a, b) in work.into_iter().zip(others) {
-            assert!(alike(a, b), "{work:?} {others:?}");
-        }
-        let [a, b] = [course.work, other.work].map(|work| work.node_pairs);
-        assert!(alike(a, b), "{a} {b}");
     }
 }
 
 #[test]
 fn obstacles_far_away_change_no_force_and_cost_nothing() {
     let near = pebbles(0.03);
-    let course = Course::among(near.clone());
+    let course = Course::among(near.clone(), 0.02);
     let far = pebbles(10.0);
     for first in [false, true] {
         let more = if first {
@@ -141,7 +146,7 @@ fn obstacles_far_away_change_no_force_and_cost_nothing() {
         } else {
             [near.clone(), far.clone()].concat()
         };
-        let other = Course::among(more);
+        let other = Course::among(more, 0.02);
         assert_eq!(course.off(&other), 0.0);
         assert_eq!(course.work, other.work);
     }

@@ -1,5 +1,5 @@
-//! The five assemblies on every row of their traces, led by exact and by erring hands:
-//! `cargo run --release -p taut-method-tests --example assembly_scenes [HANDS] [SCENE]`.
+//! The five assemblies, led by exact and by erring hands on every row of their traces, or on each of so many:
+//! `cargo run --release -p taut-method-tests --example assembly_scenes [HANDS] [SCENE] [ROWS]`.
 //!
 //! Prints a table: a line for each scene and hand; times are CPU time of the thread for an update, its force and the hand. Every pose is checked for penetration by code that shares nothing with the method.
 
@@ -17,11 +17,15 @@ fn main() {
         .and_then(|text| text.parse().ok())
         .unwrap_or(1);
     let only = std::env::args().nth(2).unwrap_or_default();
+    let rows = std::env::args()
+        .nth(3)
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(1);
     println!(
-        "scene                 hand  updates  tries  intersections  least gap  from the goal      turned  update p50    p99    max"
+        "scene                 hand  updates  unfinished  tries  intersections  least gap  from the goal      turned  update p50    p99    max"
     );
     println!(
-        "                                                                  um             um        mrad          us     us     us"
+        "                                                                              um             um        mrad          us     us     us"
     );
     for assembly in ASSEMBLIES.iter().filter(|a| a.name.contains(&only)) {
         let Some(loaded) = assembly.load() else {
@@ -45,7 +49,7 @@ fn main() {
             let mut times = Vec::new();
             // The first update comes after the trees of the independent check are built: it has no time of its own.
             let mut last = None;
-            let outcome = Assembly::run(&scene, &trace, hand.as_ref(), 1, 1, |share| {
+            let outcome = Assembly::run(&scene, &trace, hand.as_ref(), rows, 1, |share| {
                 times.extend(last.map(|before: f64| thread_cpu_us() - before));
                 bar.set_position((share * PARTS as f64) as u64);
                 last = Some(thread_cpu_us());
@@ -59,8 +63,9 @@ fn main() {
 fn print(assembly: &Assembly, hand: u64, outcome: &Outcome, times: &mut [f64]) {
     times.sort_by(f64::total_cmp);
     let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize];
+    let unfinished = outcome.samples.iter().filter(|s| s.report.unfinished);
     println!(
-        "{:21} {:>4} {:>8} {:>6} {:>14} {:>10.2} {:>14.2} {:>11.3} {:>11.0} {:>6.0} {:>6.0}",
+        "{:21} {:>5} {:>8} {:>11} {:>6} {:>14} {:>10.2} {:>14.2} {:>11.3} {:>11.0} {:>6.0} {:>6.0}",
         assembly.name,
         if hand == 0 {
             "exact".into()
@@ -68,6 +73,7 @@ fn print(assembly: &Assembly, hand: u64, outcome: &Outcome, times: &mut [f64]) {
             hand.to_string()
         },
         outcome.samples.len(),
+        unfinished.count(),
         outcome.attempts,
         outcome.penetrations.len(),
         outcome.gap_min * 1e6,

@@ -107,13 +107,14 @@ impl PairSearch<'_> {
             let best = self.best_step(&moving, pair, &placement, to - time, lately, work);
             lately.add(&best.direction);
             let far = best.gap >= self.gaps.stop; // false for NaN
-            if iteration == 0 && !far {
-                return self.near(&moving, pair, best.gap);
-            }
-            if best.step >= to - time {
+            let is_free = far && best.step >= to - time;
+            if is_free {
                 return PairOutcome::Free;
             }
             let apart = best.gap - self.gaps.stop > self.gaps.tolerance; // false for NaN
+            if !apart && iteration == 0 {
+                return self.near(&moving, pair, best.gap);
+            }
             if !apart {
                 // Not all the way: along the last direction the neighbours then are free by more than rounding, and so is
                 // the next start.

@@ -1,19 +1,27 @@
 //! One repetition of project, move and collect within an update.
 //!
-//! A trust length keeps the linear constraints honest on curved surfaces: it shrinks where a motion was cut short, and grows
-//! where it was free.
+//! | symbol | name in code            | unit | meaning                                                                     |
+//! |--------|-------------------------|------|-----------------------------------------------------------------------------|
+//! | s      | `way`                   | m    | made by a motion                                                            |
+//! | e      | `error`                 | m    | gap at its end that the linear rows foretold, less the one that is there    |
+//! | e_0    | [`ERROR_SHARE`]         | m    | error that is accepted, as a share of the rest distance                      |
+//! | D      | `trust_length`          | m | motions are no longer than that                                              |
+//!
+//! **Trust region.** Rows are linear and surfaces are curved: the error of a gap grows as the square of the way, `e = c s^2`. A motion measures c, whether it was
+//! free or cut short, and the next one may be as long as keeps the error at e_0: `D = s sqrt(e_0 / e)`. The rule is the control of the step size of
+//! ordinary differential equations, where others shrink and enlarge a trust region by factors.
+//! Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, Section II.4; Conn, Gould, Toint, Trust-Region Methods, 2000, Chapter 6.
 
 use nalgebra::{Point3, Vector3};
 
 use super::projection::Projected;
 use super::{GodObject, StepReport};
 use crate::collision::Motion;
+use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
 use crate::spatial::{
-    Vector6, advance_pose, angular, at_reference_point, from_reference_point, linear, six,
+    Pose, Vector6, advance_pose, angular, at_reference_point, from_reference_point, linear, six,
 };
 
-/// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
-const TRUSTED_SHARE: f64 = 0.5;
 /// A motion that is a smaller share of the way that the update has made is left to the next update.
 const LEAST_STEP_SHARE: f64 = 0.1;
 /// A body with less than this share of the rest distance left is eased out in the same update, however little that is: left to the next, the force on a rough
@@ -22,13 +30,10 @@ const TIGHT_GAP_SHARE: f64 = 0.5;
 /// Most by which motions become shorter when one turns back on the last: where the hand rests, a long way back after a tiny one would else keep the body
 /// where it is until the damping has doubled so often.
 const LARGEST_DAMPING: f64 = 16.0;
-/// A sub-step that loses more than this share of the rest distance to what is nearest shows the same.
-const LOST_GAP_SHARE: f64 = 0.5;
+/// By so much of the rest distance the linear rows may be wrong about the gap at the end of a motion: what is left is room for the next.
+const ERROR_SHARE: f64 = 0.5;
 /// Most shares of its way that a sub-step asks for, until rounds come to rest; what the last one gives is cut.
 const MAX_SHARES: u32 = 8;
-/// How much farther the rows are trusted after a motion that was free: what one stop took is regained in two sub-steps and not in six.
-const GROWTH: f64 = 8.0;
-
 /// What the sub-steps of one update hand on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Update {
@@ -124,19 +129,19 @@ impl GodObject {
         // 4. Move as far as continuous collision detection allows.
         let constrained = projected.acceleration * update.step_memory.damping;
         let covered = covered * update.step_memory.damping;
-        let gap_before = self.set.gap_min.min(self.settings.rest_distance);
-        let known_within = self.set.complete_within;
+        let start = self.pose_at_reference_point();
         let time = self.go(&projected, &constrained, report);
         self.carry.made(time * update.step_memory.damping);
         update.made += covered * time;
         update.branch -= angular(&constrained) * time;
 
+        // What lies beyond these is nothing that rows could have foretold.
+        let unforeseen = time < 1.0 && covered * time >= self.set.complete_within;
+        let foretold = self.foretold_gap(&start, &(constrained * time), projected.settled);
         self.collect_after(covered, update, report);
-        self.trust(
-            [covered, time],
-            [gap_before, known_within],
-            &mut update.step_memory,
-        );
+        if !unforeseen {
+            self.trust(covered, time, foretold);
+        }
         true
     }
 
@@ -152,31 +157,36 @@ impl GodObject {
         self.collect(distance, &mut report.work);
     }
 
-    /// Trusts the linear rows as far as the motion made shows: one that was to cover so much, m, and was free for a share of it. Before it the least gap and
-    /// the distance within which every pair was known were those, m.
-    fn trust(
-        &mut self,
-        [covered, time]: [f64; 2],
-        [gap_before, known_within]: [f64; 2],
-        memory: &mut StepMemory,
-    ) {
-        // The linear rows foretell no gap below the rest distance that was not there before.
-        let lost = gap_before - self.set.gap_min;
-        let true_rows = lost <= LOST_GAP_SHARE * self.settings.rest_distance; // false for NaN
-        let foreseen = covered * time < known_within; // of what lies beyond, the rows said nothing
-        if time < TRUSTED_SHARE {
-            if foreseen {
-                self.trust_length = (covered * time).max(self.settings.rest_distance);
+    /// Least gap that the rows foretell where a motion from `start` has led, at most the rest distance, m: to first order, or as rounds had them that settled.
+    fn foretold_gap(&self, start: &Pose, motion: &Vector6, settled: bool) -> f64 {
+        let reached = self.pose_at_reference_point();
+        let center = Point3::from(start.translation.vector);
+        let turned = self.settings.implicit_rounds > 0 && settled;
+        let gap = |row: &NonPenetrationConstraint| {
+            if turned {
+                row.moved(start, &reached, false).gap
+            } else {
+                row.gap + contact_jacobian(&row.normal, &row.point, &center).dot(motion)
             }
-        } else if !true_rows {
-            self.trust_length = (TRUSTED_SHARE * covered).max(self.settings.motion_tolerance);
-        } else if time >= 1.0 {
-            self.trust_length *= GROWTH;
-        }
-        if time < TRUSTED_SHARE || !true_rows {
-            // What comes next is a way out, and no turning back.
-            memory.last_motion = Vector6::zeros();
-        }
+        };
+        let gaps = self.set.constraints.iter().map(gap);
+        gaps.fold(self.settings.rest_distance, f64::min)
+    }
+
+    /// Trusts the linear rows for as long a motion as the last one shows: it was to cover so much, m, and was free for a share of it; a gap was foretold, m.
+    fn trust(&mut self, covered: f64, time: f64, foretold: f64) {
+        let (way, stopped) = (covered * time, time < 1.0);
+        let error = foretold - self.set.gap_min;
+        let accepted = ERROR_SHARE * self.settings.rest_distance;
+        let length = if error > 0.0 {
+            way * (accepted / error).sqrt()
+        } else if stopped {
+            way
+        } else {
+            f64::INFINITY
+        };
+        let most = if stopped { covered } else { f64::INFINITY };
+        self.trust_length = length.min(most).max(self.settings.rest_distance);
     }
 
     /// Eq. (1) for as much of `left` as leads no farther than the constraints are trusted for; whether that is less than all. Where the rounds of
