@@ -10,7 +10,7 @@ use god_object::collision::{
     time_of_impact,
 };
 use god_object::geometry::Mesh;
-use god_object::nalgebra::{Point3, Vector3};
+use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
 use god_object::spatial::{Pose, Vector6, from_reference_point, six};
 use proptest::prelude::*;
 
@@ -139,6 +139,37 @@ fn a_body_at_rest_distance_or_minimum_gap_slides_and_leaves_freely() {
             TimeOfImpact::Separated,
             "{gap}"
         );
+    }
+}
+
+/// Where it would be stopped if it came there it is not stopped if it starts there: a ball of facets on one of its corners rolls, and is as high or lower at
+/// no other place.
+#[test]
+fn a_body_that_starts_where_a_search_ends_is_free_to_leave() {
+    let radius = 0.05;
+    let (ball, floor) = (
+        mesh(icosphere(radius, 2)),
+        mesh(grid_box([0.5, 0.5, 0.1], [9, 9, 1])),
+    );
+    let corner = ball.vertices()[0].coords;
+    let down = UnitQuaternion::rotation_between(&corner, &-Vector3::z()).expect("not opposite");
+    for k in 0..=20 {
+        let gap = SETTINGS.minimum_gap + SETTINGS.gap_tolerance * f64::from(k) / 20.0;
+        let start = Pose::from_parts(
+            Vector3::new(0.013, 0.007, 0.1 + corner.norm() + gap).into(),
+            down,
+        );
+        for (spin, up) in [(0.5, 0.0), (0.5, 1e-6), (0.1, 0.0), (-1.2, 1e-5)] {
+            let roll = six(
+                &Vector3::new(radius * spin, 0.0, up),
+                &(Vector3::y() * spin),
+            );
+            assert_eq!(
+                search(&ball, &straight(start, roll), &floor, &Pose::identity()),
+                TimeOfImpact::Separated,
+                "{gap:e} {spin} {up}"
+            );
+        }
     }
 }
 

@@ -40,7 +40,7 @@ pub(super) enum PairOutcome {
     Hit(f64),
     /// They stay apart up to this time; the iterations ran out.
     Limit(f64),
-    /// They are at this distance, nearer than the gap to stop at, when the interval begins, m.
+    /// They are at this distance when the interval begins, m: nearer than where an advance ends, so that this search says nothing of how they go on.
     Near(f64),
     /// They intersect when the interval begins.
     Overlap,
@@ -143,7 +143,7 @@ impl PairSearch<'_> {
         }
     }
 
-    /// A pair that is nearer than the gap to stop at: along no direction is there more than `gap`.
+    /// A pair that begins where an advance ends, or nearer: along no direction is there more than `gap`.
     fn near(&self, moving: &MovingPiece, pair: &PiecePair, gap: f64) -> PairOutcome {
         let apart = gap > self.gaps.slack; // false for NaN
         let overlap = if self.swept.nothing {

@@ -32,7 +32,7 @@ impl Gaps {
         }
     }
 
-    /// For bodies whose distance at the start is `gap`, nearer than the gap to stop at; `None` when nothing is left to keep.
+    /// For bodies whose distance at the start is `gap`, at the gap to stop at or nearer; `None` when nothing is left to keep.
     pub(crate) fn keeping(&self, gap: f64) -> Option<Self> {
         let above = gap - KEPT_SLACKS * self.slack;
         let kept = if above >= self.minimum {

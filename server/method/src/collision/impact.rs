@@ -57,7 +57,7 @@ pub(super) struct First {
     pub(super) time: f64,
     /// The pair, and whether its iterations ran out.
     pub(super) hit: Option<((u32, u32), bool)>,
-    /// Least distance of the pairs that were nearer than the gap to stop at when the interval began, m.
+    /// Least distance of the pairs that were where an advance ends, or nearer, when the interval began, m.
     pub(super) near: f64,
     /// Some pair intersects.
     pub(super) overlapping: bool,

@@ -126,7 +126,7 @@ fn search(
                 problem.note_apart(&current, until, workspace);
                 return answer;
             }
-            // Nearer than the gap to stop at already: keep what there is, so that sliding and leaving stay free.
+            // Where an advance ends already, or nearer: keep what there is, so that sliding and leaving stay free.
             Err(gap) => {
                 tried = search
                     .gaps
