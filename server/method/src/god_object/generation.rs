@@ -68,7 +68,6 @@ impl GodObject {
         let motion = [*unconstrained];
         self.with_reduction(|this, reduction, at| {
             let work = &mut report.work;
-            reduction.bring_back_passed();
             this.answers(reduction, at, &motion, Purpose::Motion, work);
             if reduction.is_outdated() {
                 // Of the present pose, within the distance of the last collection.
@@ -79,7 +78,6 @@ impl GodObject {
             if reduction.meet_corners(of, unconstrained, Purpose::Motion, |way| *way, work) {
                 this.answers(reduction, at, &motion, Purpose::Motion, work);
             }
-            reduction.set_passed_aside(of, unconstrained, work);
         });
         self.write_set();
     }

@@ -36,7 +36,6 @@ mod met;
 #[cfg(test)]
 mod met_tests;
 mod neighbours;
-mod passed;
 mod row;
 
 use arrayvec::ArrayVec;
@@ -51,7 +50,6 @@ use crate::spatial::{Pose, Vector6};
 use crate::world::World;
 use candidates::Candidates;
 use corners::Corners;
-use passed::Passed;
 use row::{Known, face, felt, jacobian};
 
 /// Candidates that searches may add to those that were collected.
@@ -82,7 +80,6 @@ pub(crate) struct RowReduction {
     projector: Projector,
     candidates: Candidates,
     corners: Corners,
-    passed: Passed,
     known: Vec<Known>,
     /// Most rows known at a time: as many as the set has room for.
     room: usize,
@@ -115,7 +112,6 @@ impl RowReduction {
             projector: Projector::new(SolverKind::ActiveSet, most),
             candidates: Candidates::with_capacity(candidates + SEARCHED),
             corners: Corners::with_capacity(MAX_ROWS, candidates + SEARCHED),
-            passed: Passed::default(),
             known: Vec::with_capacity(MAX_ROWS),
             room: MAX_ROWS.min(candidates),
             now: 0,
@@ -157,7 +153,6 @@ impl RowReduction {
         work: &mut Work,
     ) {
         self.error = 0.0;
-        self.bring_back_passed();
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let outdated = &mut self.outdated;
         let mut left = ArrayVec::<FeaturePair, MAX_FOLLOWED>::new();
