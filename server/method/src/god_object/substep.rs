@@ -34,6 +34,7 @@ const LARGEST_DAMPING: f64 = 16.0;
 const ERROR_SHARE: f64 = 0.5;
 /// Most shares of its way that a sub-step asks for, until rounds come to rest; what the last one gives is cut.
 const MAX_SHARES: u32 = 8;
+
 /// What the sub-steps of one update hand on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Update {
