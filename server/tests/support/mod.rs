@@ -1,6 +1,7 @@
 //! The program from outside: a directory to work in, and how it is started.
 
 mod bridge;
+mod machine;
 mod running;
 
 use std::ffi::OsStr;
@@ -11,6 +12,7 @@ use std::time::{Duration, Instant};
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
 pub(crate) use bridge::{start_behind_relay, start_bridge};
+pub(crate) use machine::MachineWatch;
 pub(crate) use running::{Running, signal};
 
 /// A directory with a key and a workbench on free ports.
