@@ -25,8 +25,9 @@ const DURATION_S: f64 = 3.5;
 /// The force ramps in during this time after the server began to give force, of session time.
 const RAMPED_IN: Duration = Duration::from_millis(900);
 
-/// A force fades once its reading is 75 ms old, and the way there and back takes 40: waits for a core of this length may be why, and not the network.
-const STALL: Duration = Duration::from_millis(25);
+/// A force fades once its reading is 75 ms old. The way there and back takes 40, through some seven threads: where one of them waits so long for a core,
+/// the machine may be why, and not the network.
+const STALL: Duration = Duration::from_millis(5);
 /// Runs until one without a safety event.
 const ATTEMPTS: u32 = 4;
 
@@ -171,7 +172,7 @@ fn the_edge_keeps_the_force_right_over_20_ms_and_5_percent_loss_where_shipping_d
         if is_whole(&edge) {
             break;
         }
-        println!("attempt {attempt}: this machine paused its threads; once more");
+        println!("attempt {attempt}: threads waited for cores; once more");
         let again = run("edge");
         if is_whole(&again) || quantile(&again, 0.25) < quantile(&edge, 0.25) {
             edge = again;

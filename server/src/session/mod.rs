@@ -19,6 +19,7 @@ pub mod head;
 pub(crate) mod monitor;
 pub(crate) mod observers;
 pub(crate) mod operator;
+mod outside;
 mod refusals;
 mod remote_head;
 mod reporting;
@@ -65,6 +66,16 @@ struct Fidelity {
     plan: FidelityPlan,
     watch: Arc<FidelityWatch>,
     reported: [bool; 2],
+}
+
+impl Fidelity {
+    fn of(plan: FidelityPlan) -> Self {
+        Self {
+            watch: Arc::new(FidelityWatch::new(&plan)),
+            plan,
+            reported: [false; 2],
+        }
+    }
 }
 
 /// A running session. Dropped, it ends.

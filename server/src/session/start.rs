@@ -3,40 +3,32 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use god_object::{GodObject, Pose, Settings};
-use taut_bridge::edge::offer_of;
-use taut_bridge::realtime::{keep_cores_awake, lock_memory};
-use taut_bridge::{ArmWish, Device, RemoteDevice};
-use taut_link::proto::CouplingOffer;
-use taut_link::{ServerLink, ServerOptions, proto};
-use tokio::runtime::Runtime;
+use god_object::{GodObject, Pose};
+use taut_bridge::ArmWish;
+use taut_bridge::realtime::keep_cores_awake;
+use taut_link::proto;
 
 use crate::loops::checker::PenetrationChecker;
-use crate::loops::fidelity::FidelityWatch;
 use crate::loops::incidents::IncidentCursor;
-use crate::loops::realtime::{RealtimeLedger, Scheduling};
+use crate::loops::realtime::RealtimeLedger;
 use crate::loops::wiring::WiredLoops;
 use crate::session::audit::AuditTrail;
-use crate::session::broadcast::{BridgeCommands, StateWriter};
+use crate::session::broadcast::StateWriter;
 use crate::session::clients::ClientLedger;
-use crate::session::edge_sets::EdgeSets;
 use crate::session::handover::{Beginning, Handover};
 use crate::session::monitor::{
-    FreshRecording, MonitorFeed, MonitorPicture, MonitorSources, Severity,
+    FreshRecording, MonitorFeed, MonitorPicture, MonitorSettings, MonitorSources, Severity,
 };
-use crate::session::observers::ObserverServices;
-use crate::session::operator::{Continuity, Facts, OperatorPage};
+use crate::session::operator::{Continuity, Facts};
+use crate::session::outside::{Outside, Wanted, coupling_offer};
 use crate::session::setup::content::own_colours;
-use crate::session::setup::{DeviceSource, LinkSettings, SessionSetup, unencodable};
+use crate::session::setup::{DeviceSource, SessionSetup};
+use crate::session::threads::SessionThreads;
 use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
-use crate::shared::passed_wrench::{self, PassedReader};
 use crate::shared::shutdown::Shutdown;
 
 use super::{Fidelity, Session, external};
-
-/// Threads of the network runtime: one for packets, one for joins.
-const NETWORK_THREADS: usize = 2;
 
 impl Session {
     /// Builds and starts everything.
@@ -79,80 +71,69 @@ impl Session {
         if let Some(before) = before {
             setup.device = before.device(setup.device, &mut handover);
         }
-        let ledger = RealtimeLedger::default();
-        let runtime = network_runtime(&ledger)?;
-        let picture = picture(&setup);
-        let opening = opening(&setup);
+        let to_monitor = ToMonitor::of(&setup);
         let facts = setup.operator.as_ref().map(|page| Facts::of(&setup, page));
         let scene_revision = setup.content.description.revision;
         let policy = setup.link.policy.clone();
-        let options = server_options(coupling_offer(&setup)?, setup.link, clock);
-        let (observers, mut outlets) =
-            ObserverServices::start(&setup.observers, &setup.content.description, clock)?;
-        let link = runtime.block_on(taut_link::serve(options, setup.content))?;
-        let is_remote = matches!(setup.device, DeviceSource::Remote { .. });
-        let zenoh = &setup.observers.zenoh;
-        let external = external::connect(setup.external, &link, zenoh, clock)?;
-        let (external, receiver) = external.map_or((None, None), |(e, r)| (Some(e), r));
-        let (passed_in, passed) = match external.is_some() && is_remote {
-            true => Some(passed_wrench::channel()).unzip(),
-            false => (None, None),
+        let ledger = RealtimeLedger::default();
+        let wanted = Wanted {
+            coupling: coupling_offer(&setup)?,
+            link: setup.link,
+            content: setup.content,
+            observers: &setup.observers,
+            device: setup.device,
+            external: setup.external,
+            head: setup.head,
+            settings: &setup.settings,
         };
-        let (device, bridge_commands) =
-            connect_device(setup.device, &link, &setup.settings, passed)?;
-        let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
-            Failure::failed(format!("the head tracker cannot be listened to ({error})"))
-        })?;
+        let (mut outside, hand) = Outside::open(wanted, clock, &ledger)?;
 
         let mut fresh = FreshRecording::default(); // dropped after what writes it
         let recording = setup.recording.as_ref();
         let recording = recording.map(|wanted| fresh.begin(wanted));
         let (taps, recorder) = recording.transpose()?.unzip();
-        let fidelity = setup.fidelity.map(|plan| Fidelity {
-            watch: Arc::new(FidelityWatch::new(&plan)),
-            plan,
-            reported: [false; 2],
-        });
-        let most_contacts = fidelity
-            .as_ref()
-            .map_or(proto::state::MAX_CONTACTS, |f| f.plan.contacts as usize);
+        let fidelity = setup.fidelity.map(Fidelity::of);
         // Figure 3.
         let loops = WiredLoops::new(
             &setup.world,
             &setup.settings,
             god_object,
-            device,
+            hand.device,
             setup.safety,
             taps,
         )
-        .with_motions(setup.motions.clone())
+        .with_motions(setup.motions)
         .going_on_from(on_traces)
-        .with_external(external)
-        .with_passed(passed_in)
+        .with_external(hand.external)
+        .with_passed(hand.passed)
         .with_arm_switch(kept.switch.clone());
         let switch = loops.arm_switch.clone();
-        link.on_arm(move |arm| {
+        outside.link.on_arm(move |arm| {
             switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
         });
-        let operator = match (&setup.operator, facts) {
-            (Some(wanted), Some(facts)) => {
-                let page = OperatorPage::start(
-                    wanted,
-                    facts,
-                    outlets.add(),
-                    kept,
-                    &loops.statistics,
-                    clock,
-                    &policy,
-                )?;
-                Some(page.with_pictures(link.picture_asker(runtime.handle().clone())))
-            }
-            _ => {
-                kept.close();
-                None
-            }
+        let wanted = setup.operator.as_ref().zip(facts);
+        let operator = outside.start_operator(wanted, kept, &loops.statistics, clock, &policy)?;
+        let [head, watched_head] = outside.heads;
+        let most_contacts = fidelity
+            .as_ref()
+            .map_or(proto::state::MAX_CONTACTS, |f| f.plan.contacts as usize);
+        let reference_point = &setup.world.body.reference_point;
+        let readers = loops.readers;
+        let states = StateWriter::new(readers.broadcast, head, reference_point, scene_revision)
+            .with_most_contacts(most_contacts)
+            .with_carried(setup.world.obstacles.len(), &setup.carried);
+        let watch = fidelity.as_ref().map(|f| f.watch.clone());
+        let threads = SessionThreads {
+            coupling: loops.coupling,
+            god_object: loops.god_object.with_fidelity(watch),
+            haptics: loops.haptics,
+            waker: loops.coupling_waker,
+            checker: setup.checker.map(|checker| (checker, readers.checker)),
+            states,
+            broadcaster: outside.link.broadcaster(),
+            outlets: outside.outlets,
+            bridge: hand.bridge,
         };
-        let broadcaster = link.broadcaster();
         let (grant, awake) = keep_cores_awake();
         ledger.note("process", grant);
         let mut session = Self {
@@ -160,9 +141,9 @@ impl Session {
             started: clock.now(),
             shutdown: Shutdown::default(),
             ledger,
-            statistics: loops.statistics.clone(),
-            wrench: loops.readers.status,
-            arm_switch: loops.arm_switch.clone(),
+            statistics: loops.statistics,
+            wrench: readers.status,
+            arm_switch: loops.arm_switch,
             incidents: IncidentCursor::default(),
             stops_told: (0, Duration::ZERO),
             fidelity,
@@ -170,17 +151,17 @@ impl Session {
             clients: ClientLedger::default(),
             audit: AuditTrail::default(),
             external: external::ExternalTrail::default(),
-            _receiver: receiver,
+            _receiver: hand.receiver,
             threads: Vec::new(),
             monitor: None,
             recorder,
-            observers,
+            observers: outside.observers,
             operator,
-            link: Some(link),
+            link: Some(outside.link),
             handover: Arc::new(handover),
             beginning,
             makes_way: Arc::default(),
-            runtime,
+            runtime: outside.runtime,
             _awake: awake,
         };
 
@@ -188,55 +169,31 @@ impl Session {
         if let Some(settings) = &setup.monitor {
             let sources = MonitorSources {
                 head: watched_head,
-                shared: loops.readers.monitor,
-                felt: loops.readers.felt,
-                statistics: loops.statistics.clone(),
+                shared: readers.monitor,
+                felt: readers.felt,
+                statistics: session.statistics.clone(),
                 clock,
             };
-            let network = session.network.clone();
-            let feed = MonitorFeed::start(settings, &picture, sources, network, &session.shutdown)?;
-            fresh.made(feed.recording());
-            session.monitor = Some(feed);
+            session.start_monitor(settings, &to_monitor.picture, sources, &mut fresh)?;
         }
-        if setup.realtime.lock_memory {
-            session.ledger.note("process", lock_memory());
-        }
-        let states = StateWriter::new(
-            loops.readers.broadcast,
-            head,
-            &setup.world.body.reference_point,
-            scene_revision,
-        )
-        .with_most_contacts(most_contacts)
-        .with_carried(setup.world.obstacles.len(), &setup.carried);
-        session.start_coupling(
-            loops.coupling,
-            loops.coupling_waker.clone(),
-            &setup.realtime,
-        )?;
-        let watch = session.fidelity.as_ref().map(|f| f.watch.clone());
-        let god_object = loops.god_object.with_fidelity(watch);
-        session.start_god_object(god_object, loops.coupling_waker, &setup.realtime)?;
-        if let Some(checker) = setup.checker.take() {
-            session.start_checker(checker, loops.readers.checker)?;
-        }
-        session.start_broadcast(
-            states,
-            broadcaster,
-            bridge_commands,
-            outlets,
-            &setup.realtime,
-        )?;
-        session.start_frames(&setup.realtime)?;
-        if is_remote {
-            session.start_device_input(&setup.realtime)?;
-        }
-        session.start_haptics(loops.haptics, &setup.realtime)?;
-        session.start_service_manager()?;
-        session.enforce(setup.realtime.policy)?;
-        session.log_start(&opening);
+        session.start_threads(threads, &setup.realtime)?;
+        session.log_start(&to_monitor.opening);
         fresh.keep();
         Ok(session)
+    }
+
+    fn start_monitor(
+        &mut self,
+        settings: &MonitorSettings,
+        picture: &MonitorPicture,
+        sources: MonitorSources,
+        fresh: &mut FreshRecording,
+    ) -> Result<(), Failure> {
+        let network = self.network.clone();
+        let feed = MonitorFeed::start(settings, picture, sources, network, &self.shutdown)?;
+        fresh.made(feed.recording());
+        self.monitor = Some(feed);
+        Ok(())
     }
 
     /// What runs here, and what of real time is in force, to the monitor's log.
@@ -259,88 +216,21 @@ impl Session {
     }
 }
 
-/// The threads of QUIC. Strangers reach them, so they go behind normal work: whoever has proven nothing costs nobody a deadline.
-fn network_runtime(ledger: &RealtimeLedger) -> Result<Runtime, Failure> {
-    let ledger = ledger.clone();
-    tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(NETWORK_THREADS)
-        .thread_name("network")
-        .on_thread_start(move || {
-            ledger.schedule("network", Scheduling::Behind);
-        })
-        .enable_all()
-        .build()
-        .map_err(|error| {
-            Failure::failed(format!("the network's threads cannot be started ({error})"))
-        })
+/// What the monitor is told once: what its log begins with, and what it draws.
+struct ToMonitor {
+    opening: String,
+    picture: MonitorPicture,
 }
 
-/// What a bridge is offered: to couple by itself, where the device is behind one.
-fn coupling_offer(setup: &SessionSetup) -> Result<CouplingOffer, Failure> {
-    match &setup.device {
-        DeviceSource::Remote { .. } => {
-            let sets_hz = setup.realtime.bridge_period().as_secs_f64().recip();
-            offer_of(&setup.world, &setup.settings, setup.moving(), sets_hz).map_err(unencodable)
-        }
-        DeviceSource::Local(_) => Ok(CouplingOffer::AtServer {
-            reason: "its workbench has a device of its own, and no other moves anything; write kind = \"remote\" in its [device] for this one".into(),
-        }),
-    }
-}
-
-fn server_options(
-    coupling: CouplingOffer,
-    link: LinkSettings,
-    clock: SessionClock,
-) -> ServerOptions {
-    let options = ServerOptions {
-        coupling,
-        quic: link.quic,
-        udp: link.udp,
-        announced_udp_port: link.announced_udp_port,
-        multicast: link.multicast,
-        also: link.also,
-        max_clients: link.max_clients,
-        frames: link.frames,
-        policy: link.policy,
-        node_timeout: link.node_timeout,
-        clock: clock.for_link(),
-        ..ServerOptions::new(link.key)
-    };
-    // QUIC must not give up a node on a network whose pauses the workbench bears, nor before the eviction that says why.
-    ServerOptions {
-        idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
-        ..options
-    }
-}
-
-/// The device, and the commands that go to its bridge if it is behind the network.
-fn connect_device(
-    source: DeviceSource,
-    link: &ServerLink,
-    settings: &Settings,
-    passed: Option<PassedReader>,
-) -> Result<(Box<dyn Device>, Option<BridgeCommands>), Failure> {
-    match source {
-        DeviceSource::Local(device) => Ok((device, None)),
-        DeviceSource::Remote { limits, max_age } => {
-            let inputs = link.device_inputs().ok_or_else(|| {
-                Failure::failed("the device's samples are read by somebody else: this is a fault of the program")
-            })?;
-            let (device, wrenches) = RemoteDevice::new(inputs, limits, max_age);
-            let sets = EdgeSets::new(settings);
-            let commands = BridgeCommands {
-                wrenches,
-                sets,
-                passed,
-                told_none: 0,
-            };
-            Ok((Box::new(device), Some(commands)))
+impl ToMonitor {
+    fn of(setup: &SessionSetup) -> Self {
+        Self {
+            opening: opening(setup),
+            picture: picture(setup),
         }
     }
 }
 
-/// What the monitor's log begins with.
 fn opening(setup: &SessionSetup) -> String {
     let (body, settings) = (&setup.world.body, &setup.settings);
     let opening = format!(
@@ -362,7 +252,6 @@ fn opening(setup: &SessionSetup) -> String {
         .join("; ")
 }
 
-/// What the monitor draws once.
 fn picture(setup: &SessionSetup) -> MonitorPicture {
     let description = &setup.content.description;
     MonitorPicture {

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use taut_bridge::realtime::{pin_to_core, sleep_until};
+use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
 use taut_bridge::service_manager;
 use taut_link::{Broadcaster, ServerLink};
 
@@ -28,8 +28,54 @@ const COUPLING_TIMEOUT: Duration = Duration::from_millis(10);
 /// How long a session waits for its threads to ask the system for their scheduling: one that gets no turn for so long makes no deadline either.
 const SCHEDULING_TIME: Duration = Duration::from_secs(10);
 
+/// What the threads of a session run.
+pub(super) struct SessionThreads {
+    pub(super) coupling: CouplingLoop,
+    pub(super) god_object: GodObjectLoop,
+    pub(super) haptics: HapticsLoop,
+    /// Wakes the coupling.
+    pub(super) waker: Waker,
+    pub(super) checker: Option<(PenetrationChecker, Subscriber<ContactSnapshot>)>,
+    pub(super) states: StateWriter,
+    pub(super) broadcaster: Broadcaster,
+    pub(super) outlets: Outlets,
+    /// Where the device is behind the network.
+    pub(super) bridge: Option<BridgeCommands>,
+}
+
 impl Session {
-    pub(super) fn start_coupling(
+    /// Starts all of them, and returns when each is scheduled as it is to be.
+    pub(super) fn start_threads(
+        &mut self,
+        threads: SessionThreads,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
+        if realtime.lock_memory {
+            self.ledger.note("process", lock_memory());
+        }
+        let is_remote = threads.bridge.is_some();
+        self.start_coupling(threads.coupling, threads.waker.clone(), realtime)?;
+        self.start_god_object(threads.god_object, threads.waker, realtime)?;
+        if let Some((checker, contacts)) = threads.checker {
+            self.start_checker(checker, contacts)?;
+        }
+        self.start_broadcast(
+            threads.states,
+            threads.broadcaster,
+            threads.bridge,
+            threads.outlets,
+            realtime,
+        )?;
+        self.start_frames(realtime)?;
+        if is_remote {
+            self.start_device_input(realtime)?;
+        }
+        self.start_haptics(threads.haptics, realtime)?;
+        self.start_service_manager()?;
+        self.enforce(realtime.policy)
+    }
+
+    fn start_coupling(
         &mut self,
         mut coupling: CouplingLoop,
         waker: Waker,
@@ -50,7 +96,7 @@ impl Session {
         )
     }
 
-    pub(super) fn start_god_object(
+    fn start_god_object(
         &mut self,
         mut god_object: GodObjectLoop,
         waker: Waker,
@@ -81,7 +127,7 @@ impl Session {
         )
     }
 
-    pub(super) fn start_checker(
+    fn start_checker(
         &mut self,
         checker: PenetrationChecker,
         contacts: Subscriber<ContactSnapshot>,
@@ -92,7 +138,7 @@ impl Session {
         })
     }
 
-    pub(super) fn start_broadcast(
+    fn start_broadcast(
         &mut self,
         mut states: StateWriter,
         broadcaster: Broadcaster,
@@ -128,7 +174,7 @@ impl Session {
     }
 
     /// The barrier of the render nodes' frames, where the workbench wants one.
-    pub(super) fn start_frames(&mut self, realtime: &RealtimeSettings) -> Result<(), Failure> {
+    fn start_frames(&mut self, realtime: &RealtimeSettings) -> Result<(), Failure> {
         let Some(mut master) = self.link.as_ref().and_then(ServerLink::frame_master) else {
             return Ok(());
         };
@@ -142,10 +188,7 @@ impl Session {
     }
 
     /// What the device behind the network sends, by a way that is its own.
-    pub(super) fn start_device_input(
-        &mut self,
-        realtime: &RealtimeSettings,
-    ) -> Result<(), Failure> {
+    fn start_device_input(&mut self, realtime: &RealtimeSettings) -> Result<(), Failure> {
         let Some(mut receiver) = self.link.as_ref().map(ServerLink::device_receiver) else {
             return Ok(());
         };
@@ -158,7 +201,7 @@ impl Session {
         )
     }
 
-    pub(super) fn start_haptics(
+    fn start_haptics(
         &mut self,
         mut haptics: HapticsLoop,
         realtime: &RealtimeSettings,
@@ -196,7 +239,7 @@ impl Session {
     }
 
     /// Signs of life to systemd, where it started this.
-    pub(super) fn start_service_manager(&mut self) -> Result<(), Failure> {
+    fn start_service_manager(&mut self) -> Result<(), Failure> {
         if !service_manager::is_there() {
             return Ok(());
         }
@@ -242,7 +285,7 @@ impl Session {
     }
 
     /// Waits for the answers of the system, and takes a refusal as the policy says.
-    pub(super) fn enforce(&self, policy: RealtimePolicy) -> Result<(), Failure> {
+    fn enforce(&self, policy: RealtimePolicy) -> Result<(), Failure> {
         let refused = match self.ledger.answers(SCHEDULING_TIME) {
             Ok(report) => report.waived.into_iter().next(),
             Err(name) => Some(format!(

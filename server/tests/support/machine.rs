@@ -1,13 +1,12 @@
 //! What the machine did to this process's threads while a test ran: the system counts how long each has waited for a core.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Waits of different threads delay a datagram together if they fall within this time of each other.
-const WINDOW: Duration = Duration::from_millis(120);
+const PERIOD: Duration = Duration::from_millis(5);
 
 /// Looks until it is asked.
 pub(crate) struct MachineWatch {
@@ -26,8 +25,8 @@ impl MachineWatch {
         Self { thread, over }
     }
 
-    /// The most that threads of this process waited for a core, all together, within a tenth of a second; that a sleeping one woke late counts,
-    /// too: a machine that stands still counts no waits.
+    /// The most that a thread of this process waited for a core from one look to the next; that this one woke late counts, too: a machine that stands still
+    /// counts no waits.
     pub(crate) fn longest_wait(self) -> Duration {
         self.over.store(true, Ordering::Relaxed);
         self.thread.join().expect("no panic")
@@ -35,24 +34,17 @@ impl MachineWatch {
 }
 
 fn longest(over: &AtomicBool) -> Duration {
-    let mut of_threads = waits();
-    let mut recent: VecDeque<(Instant, Duration)> = VecDeque::new();
+    let mut before = waits();
     let mut longest = Duration::ZERO;
     while !over.load(Ordering::Relaxed) {
-        let before = Instant::now();
-        std::thread::sleep(Duration::from_millis(5));
-        let late = before.elapsed().saturating_sub(Duration::from_millis(5));
+        let asleep = Instant::now();
+        std::thread::sleep(PERIOD);
+        let late = asleep.elapsed().saturating_sub(PERIOD);
         let now = waits();
-        let waited: u64 = now
-            .iter()
-            .map(|(thread, ns)| ns - of_threads.get(thread).unwrap_or(&0).min(ns))
-            .sum();
-        of_threads = now;
-        recent.push_back((Instant::now(), late.max(Duration::from_nanos(waited))));
-        while recent.front().is_some_and(|(at, _)| at.elapsed() > WINDOW) {
-            recent.pop_front();
-        }
-        longest = longest.max(recent.iter().map(|(_, waited)| *waited).sum());
+        let since = |(thread, ns): (&String, &u64)| ns - before.get(thread).unwrap_or(&0).min(ns);
+        let waited = now.iter().map(since).max().unwrap_or(0);
+        longest = longest.max(late).max(Duration::from_nanos(waited));
+        before = now;
     }
     longest
 }
