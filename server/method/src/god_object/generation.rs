@@ -129,15 +129,11 @@ impl GodObject {
             MAX_MOTIONS
         };
         self.complete_for_force(&probes[..asked], work);
-        let met = self.with_reduction(|this, reduction, at| {
+        self.with_reduction(|this, reduction, at| {
             let continued = |way: &Vector6| this.continued(way, reach);
             let of = (at, &this.surfaces(None) as &dyn Surfaces);
-            reduction.meet_corners(of, &probes[1], Purpose::Force, continued, work)
+            reduction.meet_corners(of, &probes[1], Purpose::Force, continued, work);
         });
-        if met == Some(true) && all != Some(true) {
-            // The rows of the other probes are there, and no corner asks for more of them.
-            self.complete_for_force(&probes[..LEADING_MOTIONS], work);
-        }
         if let Some(reduction) = &mut self.reduction {
             reduction.retire();
         }

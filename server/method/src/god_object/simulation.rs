@@ -216,7 +216,6 @@ impl GodObject {
             SET_PERIODS * self.way_beside_obstacles(&device, &last) + self.device_ahead;
         let mut update = Update {
             until_next,
-            moved: device_moved + obstacle_way,
             went_along,
             share: self.settings.k_s * part,
             look_ahead: until_next,
@@ -228,9 +227,6 @@ impl GodObject {
         let made = pose_difference(&self.pose_at_reference_point(), &start, &Vector3::zeros());
         if self.motion_length(&made) > self.settings.motion_tolerance {
             self.rest_memory.relax(&made, self.radius);
-        } else {
-            // A goal so near that nothing moves would keep the body where it is, short of its minimum.
-            self.rest_memory.grow();
         }
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
         let published = self.published_distance(&update);

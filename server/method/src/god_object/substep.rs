@@ -27,9 +27,6 @@ const LEAST_STEP_SHARE: f64 = 0.1;
 /// A body with less than this share of the rest distance left is eased out in the same update, however little that is: left to the next, the force on a rough
 /// peg in a hole of 5 um is off by half.
 const TIGHT_GAP_SHARE: f64 = 0.5;
-/// Most by which motions become shorter when one turns back on the last: where the hand rests, a long way back after a tiny one would else keep the body
-/// where it is until the damping has doubled so often.
-const LARGEST_DAMPING: f64 = 16.0;
 /// By so much of the rest distance the linear rows may be wrong about the gap at the end of a motion: what is left is room for the next.
 const ERROR_SHARE: f64 = 0.5;
 /// Most shares of its way that a sub-step asks for, until rounds come to rest; what the last one gives is cut.
@@ -40,8 +37,6 @@ const MAX_SHARES: u32 = 8;
 pub(super) struct Update {
     /// Path that the device may make beside an obstacle until the set is replaced, m, both at the speed of the last update.
     pub(super) until_next: f64,
-    /// Their path since the last update, m.
-    pub(super) moved: f64,
     /// How far the body went along with an obstacle, m.
     pub(super) went_along: f64,
     /// Share of the way to the device that this update covers.
@@ -107,11 +102,6 @@ impl GodObject {
             let shared = (covered - update.went_along).max(0.0);
             update.look_ahead = update.until_next + shared * (1.0 - update.share) / update.share;
         }
-        // Projections are non-expansive: of motions up to the device's own, the last one is no cause.
-        let follows = update.made == 0.0 && covered <= update.moved;
-        if follows {
-            update.step_memory = StepMemory::default();
-        }
         update
             .step_memory
             .relax(&projected.acceleration, self.radius);
@@ -139,23 +129,13 @@ impl GodObject {
         // What lies beyond these is nothing that rows could have foretold.
         let unforeseen = time < 1.0 && covered * time >= self.set.complete_within;
         let foretold = self.foretold_gap(&start, &(constrained * time), projected.settled);
-        self.collect_after(covered, update, report);
+        // For the next sub-step: what is published looks farther, once.
+        let near = self.settings.activation_distance;
+        self.collect(self.published_distance(update).min(near), &mut report.work);
         if !unforeseen {
             self.trust(covered, time, foretold);
         }
         true
-    }
-
-    /// Step 5: collects at the pose reached, what is published, unless that looks far ahead and another sub-step is likely. Most of the work is
-    /// in what is near, and a set that serves the next sub-step alone is collected again when there is none.
-    fn collect_after(&mut self, covered: f64, update: &Update, report: &mut StepReport) {
-        let published = self.published_distance(update);
-        let distance = if covered < self.settings.rest_distance {
-            published
-        } else {
-            published.min(self.settings.activation_distance)
-        };
-        self.collect(distance, &mut report.work);
     }
 
     /// Least gap that the rows foretell where a motion from `start` has led, at most the rest distance, m: to first order, or as rounds had them that settled.
@@ -300,15 +280,11 @@ impl StepMemory {
         if along < 0.0 {
             // Aitken's extrapolation: motions in proportion to the way that is left would end here.
             let ratio = along / weighed(&self.last_motion, &self.last_motion);
-            self.damping /= (1.0 - ratio).min(LARGEST_DAMPING);
+            self.damping /= 1.0 - ratio;
         } else if along > 0.0 {
-            self.grow();
+            // Not at once all: a peg at the mouth of its hole would go to and fro, and stay there.
+            self.damping = (2.0 * self.damping).min(1.0);
         }
         self.last_motion = *motion;
-    }
-
-    /// The next motion makes twice the share, and not at once all: a peg at the mouth of its hole would go to and fro, and stay there.
-    pub(super) fn grow(&mut self) {
-        self.damping = (2.0 * self.damping).min(1.0);
     }
 }

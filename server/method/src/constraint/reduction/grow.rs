@@ -7,9 +7,9 @@ use super::neighbours::{for_neighbours, for_turned};
 use super::row::{Known, face};
 use super::{MAX_ROUNDS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES};
 use crate::collision::{MAX_MOTIONS, Placement, Work};
+use crate::constraint::FeaturePair;
 use crate::constraint::collect::{for_contacts, in_world};
 use crate::constraint::facing::{Facing, Reach};
-use crate::constraint::{Contact, FeaturePair};
 use crate::geometry::Mesh;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection};
 use crate::spatial::Vector6;
@@ -107,8 +107,7 @@ impl RowReduction {
         self.projector.prepare(&at.metric, &self.rows);
     }
 
-    /// Adds the pairs that those of rows turn into which hold the body, where the motion violates them by more than the tolerance; whether there are any. For a
-    /// motion also of rows that touch, and that it leaves: what lies in a groove leaves one of its sides for the other.
+    /// Adds the pairs that those of rows turn into which hold the body, where the motion violates them by more than the tolerance; whether there are any.
     fn add_turned(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
@@ -118,18 +117,11 @@ impl RowReduction {
     ) -> bool {
         let before = self.now;
         let least_gap = purpose.least_gap(at);
-        let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
         for k in 0..self.known.len() {
-            let Contact {
-                features: pair,
-                gap,
-                ..
-            } = self.known[k].contact;
-            let held = self.warm_start.contains(&(k as u32));
-            let near = purpose == Purpose::Motion && gap <= touching;
-            if !held && !near {
+            if !self.warm_start.contains(&(k as u32)) {
                 continue;
             }
+            let pair = self.known[k].contact.features;
             let consider = |features: FeaturePair| {
                 if self.knows(&features) {
                     return;

@@ -154,13 +154,11 @@ impl RowReduction {
     ) {
         self.error = 0.0;
         let near = NEAR_REST_DISTANCES * at.rest_distance;
-        let outdated = &mut self.outdated;
         let mut left = ArrayVec::<FeaturePair, MAX_FOLLOWED>::new();
         self.known.retain_mut(|row| {
             let facing = face(at, &row.contact.features, false, work);
             let was_implied = std::mem::replace(&mut row.implied, facing.is_none());
             let mattered = row.implied && !was_implied && row.contact.gap <= near;
-            *outdated |= mattered;
             if mattered && !left.is_full() {
                 left.push(row.contact.features);
             }
