@@ -25,7 +25,7 @@ const DURATION_S: f64 = 3.5;
 /// The force ramps in during this time after the server began to give force, of session time.
 const RAMPED_IN: Duration = Duration::from_millis(900);
 
-/// A force fades once its reading is 75 ms old. The way there and back takes 40, through some seven threads: where one of them waits so long for a core,
+/// A force fades once its reading is 75 ms old. The way there and back takes 40, through some seven threads: where one of them waits for a core as long as this,
 /// the machine may be why, and not the network.
 const STALL: Duration = Duration::from_millis(5);
 /// Runs until one without a safety event.
@@ -86,6 +86,7 @@ fn run(coupling: &str) -> Run {
         .join()
         .expect("no panic")
         .unwrap_or_else(|error| panic!("{error}"));
+    let waited = watch.longest_wait();
     let lost_down = relay.counts(Direction::Down).all_lost();
     session.follow_network(&Terminal::standard_error());
     let (_, failure) = session.stop(&Terminal::standard_error());
@@ -93,7 +94,7 @@ fn run(coupling: &str) -> Run {
     Run {
         errors,
         interrupted,
-        waited: watch.longest_wait(),
+        waited,
         report,
         lost_down,
     }

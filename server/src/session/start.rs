@@ -15,12 +15,12 @@ use crate::loops::wiring::WiredLoops;
 use crate::session::audit::AuditTrail;
 use crate::session::broadcast::StateWriter;
 use crate::session::clients::ClientLedger;
+use crate::session::connections::{ConnectionSettings, Connections, coupling_offer};
 use crate::session::handover::{Beginning, Handover};
 use crate::session::monitor::{
     FreshRecording, MonitorFeed, MonitorPicture, MonitorSettings, MonitorSources, Severity,
 };
 use crate::session::operator::{Continuity, Facts};
-use crate::session::outside::{Outside, Wanted, coupling_offer};
 use crate::session::setup::content::own_colours;
 use crate::session::setup::{DeviceSource, SessionSetup};
 use crate::session::threads::SessionThreads;
@@ -76,7 +76,7 @@ impl Session {
         let scene_revision = setup.content.description.revision;
         let policy = setup.link.policy.clone();
         let ledger = RealtimeLedger::default();
-        let wanted = Wanted {
+        let wanted = ConnectionSettings {
             coupling: coupling_offer(&setup)?,
             link: setup.link,
             content: setup.content,
@@ -86,7 +86,7 @@ impl Session {
             head: setup.head,
             settings: &setup.settings,
         };
-        let (mut outside, hand) = Outside::open(wanted, clock, &ledger)?;
+        let (mut connections, device_side) = Connections::open(wanted, clock, &ledger)?;
 
         let mut fresh = FreshRecording::default(); // dropped after what writes it
         let recording = setup.recording.as_ref();
@@ -98,22 +98,23 @@ impl Session {
             &setup.world,
             &setup.settings,
             god_object,
-            hand.device,
+            device_side.device,
             setup.safety,
             taps,
         )
         .with_motions(setup.motions)
         .going_on_from(on_traces)
-        .with_external(hand.external)
-        .with_passed(hand.passed)
+        .with_external(device_side.external)
+        .with_passed(device_side.passed)
         .with_arm_switch(kept.switch.clone());
         let switch = loops.arm_switch.clone();
-        outside.link.on_arm(move |arm| {
+        connections.link.on_arm(move |arm| {
             switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
         });
         let wanted = setup.operator.as_ref().zip(facts);
-        let operator = outside.start_operator(wanted, kept, &loops.statistics, clock, &policy)?;
-        let [head, watched_head] = outside.heads;
+        let operator =
+            connections.start_operator(wanted, kept, &loops.statistics, clock, &policy)?;
+        let [head, watched_head] = connections.heads;
         let most_contacts = fidelity
             .as_ref()
             .map_or(proto::state::MAX_CONTACTS, |f| f.plan.contacts as usize);
@@ -130,9 +131,9 @@ impl Session {
             waker: loops.coupling_waker,
             checker: setup.checker.map(|checker| (checker, readers.checker)),
             states,
-            broadcaster: outside.link.broadcaster(),
-            outlets: outside.outlets,
-            bridge: hand.bridge,
+            broadcaster: connections.link.broadcaster(),
+            outlets: connections.outlets,
+            bridge: device_side.bridge,
         };
         let (grant, awake) = keep_cores_awake();
         ledger.note("process", grant);
@@ -151,17 +152,17 @@ impl Session {
             clients: ClientLedger::default(),
             audit: AuditTrail::default(),
             external: external::ExternalTrail::default(),
-            _receiver: hand.receiver,
+            _receiver: device_side.receiver,
             threads: Vec::new(),
             monitor: None,
             recorder,
-            observers: outside.observers,
+            observers: connections.observers,
             operator,
-            link: Some(outside.link),
+            link: Some(connections.link),
             handover: Arc::new(handover),
             beginning,
             makes_way: Arc::default(),
-            runtime: outside.runtime,
+            runtime: connections.runtime,
             _awake: awake,
         };
 

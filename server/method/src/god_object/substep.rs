@@ -24,8 +24,8 @@ use crate::spatial::{
 
 /// A motion that is a smaller share of the way that the update has made is left to the next update.
 const LEAST_STEP_SHARE: f64 = 0.1;
-/// A body with less than this share of the rest distance left is eased out in the same update, however little that is: left to the next, the force on a rough
-/// peg in a hole of 5 um is off by half.
+/// A body with less than this share of the rest distance left is eased out in the same update, however little that is: left to the next, forces between dense
+/// meshes are off, and depend on the order of the obstacles (`bunnies` and `many_obstacles` of the tests).
 const TIGHT_GAP_SHARE: f64 = 0.5;
 /// By so much of the rest distance the linear rows may be wrong about the gap at the end of a motion: what is left is room for the next.
 const ERROR_SHARE: f64 = 0.5;

@@ -25,7 +25,7 @@ use super::external;
 const NETWORK_THREADS: usize = 2;
 
 /// What is to be opened.
-pub(super) struct Wanted<'a> {
+pub(super) struct ConnectionSettings<'a> {
     /// What a bridge is offered.
     pub(super) coupling: CouplingOffer,
     pub(super) link: LinkSettings,
@@ -38,7 +38,7 @@ pub(super) struct Wanted<'a> {
 }
 
 /// The network, and who reads or looks on.
-pub(super) struct Outside {
+pub(super) struct Connections {
     pub(super) link: ServerLink,
     pub(super) observers: ObserverServices,
     pub(super) outlets: Outlets,
@@ -48,8 +48,8 @@ pub(super) struct Outside {
     pub(super) runtime: Runtime,
 }
 
-/// What moves the god-object, and what is felt beside the contacts.
-pub(super) struct Hand {
+/// The device, and the forces from outside that are felt there beside the contacts.
+pub(super) struct DeviceSide {
     pub(super) device: Box<dyn Device>,
     /// Where the device is behind the network: what goes to its bridge.
     pub(super) bridge: Option<BridgeCommands>,
@@ -59,12 +59,12 @@ pub(super) struct Hand {
     pub(super) passed: Option<PassedWriter>,
 }
 
-impl Outside {
+impl Connections {
     pub(super) fn open(
-        wanted: Wanted<'_>,
+        wanted: ConnectionSettings<'_>,
         clock: SessionClock,
         ledger: &RealtimeLedger,
-    ) -> Result<(Self, Hand), Failure> {
+    ) -> Result<(Self, DeviceSide), Failure> {
         let runtime = network_runtime(ledger)?;
         let options = server_options(wanted.coupling, wanted.link, clock);
         let description = &wanted.content.description;
@@ -72,18 +72,18 @@ impl Outside {
         let link = runtime.block_on(taut_link::serve(options, wanted.content))?;
         let zenoh = &wanted.observers.zenoh;
         let external = external::connect(wanted.external, &link, zenoh, clock)?;
-        let hand = Hand::connect(wanted.device, external, &link, wanted.settings)?;
+        let device_side = DeviceSide::connect(wanted.device, external, &link, wanted.settings)?;
         let heads = wanted.head.start(link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
-        let outside = Self {
+        let connections = Self {
             link,
             observers,
             outlets,
             heads,
             runtime,
         };
-        Ok((outside, hand))
+        Ok((connections, device_side))
     }
 
     /// The operator's page, where one is wanted.
@@ -106,7 +106,7 @@ impl Outside {
     }
 }
 
-impl Hand {
+impl DeviceSide {
     fn connect(
         source: DeviceSource,
         external: Option<(ExternalWrench, Option<external::Receiver>)>,
@@ -114,7 +114,7 @@ impl Hand {
         settings: &Settings,
     ) -> Result<Self, Failure> {
         let (external, receiver) = external.unzip();
-        let hand = match source {
+        Ok(match source {
             DeviceSource::Local(device) => Self {
                 device,
                 bridge: None,
@@ -141,8 +141,7 @@ impl Hand {
                     passed: writer,
                 }
             }
-        };
-        Ok(hand)
+        })
     }
 }
 
