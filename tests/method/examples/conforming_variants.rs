@@ -22,11 +22,12 @@ type Column = (&'static str, fn(&Outcome) -> f64);
 /// Of many designs, rows that are off by less are not printed.
 const SHOWN_ERROR: f64 = 0.01;
 
-const COLUMNS: [Column; 12] = [
+const COLUMNS: [Column; 13] = [
     ("p50", |o| quantile(&o.update, 0.5)),
     ("p99", |o| quantile(&o.update, 0.99)),
     ("max", |o| quantile(&o.update, 1.0)),
     ("work p99", |o| quantile(&o.work, 0.99)),
+    ("work max", |o| quantile(&o.work, 1.0)),
     ("force p99", |o| quantile(&o.force, 0.99)),
     ("error %", |o| 100.0 * quantile(&o.errors, 1.0)),
     ("rows p50", |o| quantile(&o.rows, 0.5)),

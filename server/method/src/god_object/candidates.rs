@@ -2,7 +2,7 @@
 
 use super::GodObject;
 use crate::collision::{Placement, Work};
-use crate::constraint::{At, Collected, Contact, RowReduction, collect_bounded};
+use crate::constraint::{At, Collected, RowReduction, collect_bounded};
 
 impl GodObject {
     /// The facing pairs within `distance`, m; every obstacle has its share of the work. Where some need more than last time, those that come after
@@ -31,7 +31,7 @@ impl GodObject {
             } else {
                 share
             };
-            let collected = self.candidates_of(index, reduction, at, (distance, pairs), work);
+            let collected = self.candidates_of(index, at, (distance, pairs), work);
             left = left.saturating_sub(collected.looked_at.min(pairs));
             self.looked_at[index] = collected.looked_at;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
@@ -90,38 +90,22 @@ impl GodObject {
     fn candidates_of(
         &mut self,
         index: usize,
-        reduction: &mut RowReduction,
         at: &At,
         (distance, pairs): (f64, u64),
         work: &mut Work,
     ) -> Collected {
         let (obstacle, pose) = at.obstacle(index);
-        let contacts = &mut self.contacts;
-        let mut collect_within = |reach: f64, pairs: u64, contacts: &mut Vec<Contact>| {
-            collect_bounded(
-                ((&at.world.body.mesh).into(), &at.pose),
-                (obstacle.into(), pose),
-                u16::try_from(index).unwrap_or(u16::MAX),
-                reach,
-                pairs,
-                self.collision.of_obstacle(index),
-                contacts,
-                work,
-            )
-        };
-        contacts.clear();
-        let mut reach = reduction.reach(index, distance);
-        let mut collected = collect_within(reach, pairs, contacts);
-        // That was little: there is work left for the rest.
-        let done = collected.looked_at;
-        if reach < distance && collected.complete_within >= reach && done < pairs / 2 {
-            reach = distance;
-            contacts.clear();
-            collected = collect_within(reach, pairs - done, contacts);
-            collected.looked_at += done;
-        }
-        reduction.reached(at, index, [reach, distance], collected.complete_within);
-        collected
+        self.contacts.clear();
+        collect_bounded(
+            ((&at.world.body.mesh).into(), &at.pose),
+            (obstacle.into(), pose),
+            u16::try_from(index).unwrap_or(u16::MAX),
+            distance,
+            pairs,
+            self.collision.of_obstacle(index),
+            &mut self.contacts,
+            work,
+        )
     }
 }
 

@@ -65,6 +65,8 @@ pub struct GodObject {
     pub(super) was_stopped: bool,
     /// The obstacle that cut this update's last motion short.
     pub(super) last_stop: Option<usize>,
+    /// Pairs of pieces that the last motion's search for impact looked at.
+    pub(super) impact_pairs: u64,
     /// Distance within which the present set has every row, m.
     pub(super) collected_within: f64,
     /// Longest look-ahead that the last collections' cost allows, where rows are not chosen, m.
@@ -138,6 +140,7 @@ impl GodObject {
             stopped: None,
             was_stopped: false,
             last_stop: None,
+            impact_pairs: 0,
             collected_within: 0.0,
             affordable: settings.activation_distance + settings.look_ahead_limit,
         };

@@ -231,7 +231,9 @@ impl GodObject {
         report: &mut StepReport,
     ) -> f64 {
         let motion = self.motion(displacement, &projected.straight);
+        let before = report.work.triangle_pairs;
         let (time, stopped) = self.free_time(motion, |_| false, report);
+        self.impact_pairs = report.work.triangle_pairs - before;
         self.stopped = stopped.or(self.stopped);
         self.was_stopped |= stopped.is_some();
         self.last_stop = stopped;

@@ -1,4 +1,4 @@
-//! What collections brought, how far they reach, and how far the next one is to reach.
+//! What collections brought, and how far they reach.
 
 use super::at::{At, Purpose, Surfaces};
 use super::row::{Known, jacobian};
@@ -9,8 +9,6 @@ use crate::spatial::{Vector6, angular, linear};
 /// Where a collection has every pair up to so many rest distances, no more are searched for. Up to two of them a peg in its hole took two fifths more work in the
 /// median, and its force was the same.
 const COLLECTED_REST_DISTANCES: f64 = 1.5;
-/// A collection reaches for so many times what the last one was complete within, where that was given up.
-const REACH_GROWTH: f64 = 2.0;
 
 impl RowReduction {
     /// How far the body and the obstacles may have gone since the candidates were collected, m: `radius` bounds the arms of the body's points about G.
@@ -56,27 +54,6 @@ impl RowReduction {
         self.served = f64::INFINITY;
     }
 
-    /// How far the pairs of an obstacle are to be collected of a distance asked for, m: what the work did not allow last time it will hardly allow now.
-    pub(crate) fn reach(&self, obstacle: usize, asked: f64) -> f64 {
-        asked.min(self.next_reach[obstacle])
-    }
-
-    /// Takes note of how far a collection came that was to reach so far of what was asked for, m.
-    pub(crate) fn reached(
-        &mut self,
-        at: &At,
-        obstacle: usize,
-        [reach, asked]: [f64; 2],
-        within: f64,
-    ) {
-        let whole = within >= reach && reach >= asked; // false for NaN
-        self.next_reach[obstacle] = if whole {
-            f64::INFINITY
-        } else {
-            REACH_GROWTH * within.max(at.rest_distance)
-        };
-    }
-
     /// Adds contacts of one obstacle at the present pose to choose from, world frame, complete within a distance (m).
     pub(crate) fn offer(
         &mut self,
@@ -91,6 +68,7 @@ impl RowReduction {
                 .push(contact, &jacobian(contact, &at.center()));
         }
         let mut within = collected.complete_within;
+        self.given_up_at[obstacle] = (within < self.asked).then_some(within);
         if contacts.len() > room {
             within = within.min(contacts[room].gap);
         }
@@ -134,7 +112,7 @@ impl RowReduction {
 
     /// Whether the last collection of an obstacle was given up before it had every pair that touches: what motions violate is searched for there.
     pub(crate) fn conforms(&self, at: &At, obstacle: usize) -> bool {
-        let collected = COLLECTED_REST_DISTANCES * at.rest_distance;
-        self.next_reach[obstacle] < REACH_GROWTH * collected
+        let touching = COLLECTED_REST_DISTANCES * at.rest_distance;
+        self.given_up_at[obstacle].is_some_and(|within| within < touching)
     }
 }

@@ -124,6 +124,7 @@ impl RowReduction {
             changed |= met.is_some();
             let row = met.map_or(row, |contact| Known {
                 idle: row.idle,
+                holds: row.holds,
                 used: row.used,
                 implied: row.implied,
                 ..Known::of(&contact, surfaces, &at.center())

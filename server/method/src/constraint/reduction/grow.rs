@@ -80,10 +80,19 @@ impl RowReduction {
                 && self.add_turned((at, surfaces), answer, purpose, work);
             *prepared = self.now == before;
             if finished && !turned {
+                self.note_answer(&projection);
                 let is_known = violation.is_finite() && projection.kkt_residual <= KKT_TOLERANCE;
                 let error = if is_known { violation } else { f64::INFINITY };
                 self.error = self.error.max(error);
                 return projection;
+            }
+        }
+    }
+
+    fn note_answer(&mut self, answer: &Projection) {
+        for row in &answer.active {
+            if let Some(row) = self.known.get_mut(row.row as usize) {
+                row.holds = true;
             }
         }
     }

@@ -94,8 +94,8 @@ pub(crate) struct RowReduction {
     /// A row that touches may be missing.
     truncated: bool,
     asked: f64,
-    /// How far the next collection of each obstacle's pairs is to reach, m.
-    next_reach: Vec<f64>,
+    /// Distance within which the last collection of each obstacle was complete, m, where it was given up.
+    given_up_at: Vec<Option<f64>>,
     /// A pair that mattered faces no more: its neighbours were no candidates where they were collected.
     outdated: bool,
     /// How far the points of each obstacle may have gone since the candidates were collected, m.
@@ -121,7 +121,7 @@ impl RowReduction {
             error: 0.0,
             truncated: false,
             asked: 0.0,
-            next_reach: vec![f64::INFINITY; world.obstacles.len()],
+            given_up_at: vec![None; world.obstacles.len()],
             outdated: false,
             gone: vec![0.0; world.obstacles.len()],
             served: 0.0,
@@ -307,12 +307,16 @@ impl RowReduction {
         let mut rows = self.known.iter_mut();
         if let Some(row) = rows.find(|row| row.contact.features == *features) {
             row.note_use(self.now);
+            row.holds = true;
         }
     }
 
     /// An update has ended: rows that were of no use for long are let go.
     pub(crate) fn retire(&mut self) {
-        self.known.iter_mut().for_each(|row| row.idle += 1);
+        self.known.iter_mut().for_each(|row| {
+            row.idle += 1;
+            row.holds = false;
+        });
         self.known.retain(|row| {
             let longest = if row.implied {
                 IDLE_UPDATES_IMPLIED
@@ -342,10 +346,10 @@ impl RowReduction {
         (0..self.known.len()).min_by_key(|k| self.known[*k].used)
     }
 
-    /// What motions of this update needed may be violated by them now; what they did not is no loss.
+    /// What answers of this update press against may be violated by them now; without a row that holds none they are what they were.
     fn note_dropped(&mut self, row: &Known) {
         self.candidates.put_back(&row.contact);
-        if row.idle == 0 {
+        if row.holds {
             self.truncated = true;
             self.error = f64::INFINITY;
         }

@@ -20,6 +20,8 @@ pub(super) struct Known {
     pub(super) nearer: f64,
     /// Updates since its last use.
     pub(super) idle: u32,
+    /// An answer of this update presses against it.
+    pub(super) holds: bool,
     /// When it was of use last: larger is later.
     pub(super) used: u64,
     /// Its pair faces no more: it slid past a reentrant edge, where the row is implied by those that are there.
@@ -65,6 +67,7 @@ impl Known {
             felt: felt(contact, surfaces, center),
             nearer: surfaces.nearer(contact),
             idle: 0,
+            holds: false,
             used: 0,
             implied: false,
         }
