@@ -12,7 +12,9 @@ use crate::geometry::lanes::{LANES, Lanes};
 use crate::geometry::wide_tree::{Child, WideTree};
 
 /// Nodes of each tree of which it is kept what the motions do there.
-const KEPT: usize = 32;
+const KEPT: usize = 256;
+/// Share of a known distance that single precision may have got wrong.
+const KNOWN_ROUNDING: f32 = 1e-5;
 /// Marks a place where none is kept.
 const NO_NODE: u32 = u32::MAX;
 
@@ -29,12 +31,13 @@ fn signed_band_of(share: f32) -> u32 {
 }
 
 /// Calls `visit` for the pairs of triangles, (body, obstacle), within `margin`, m, that some of the motions may bring below `target`, m: those first that
-/// end up deepest, to a band. The motions are given as the body and as the obstacle sees them. Stops when `visit` returns false, and where there is no
-/// room for pairs of volumes that wait.
+/// end up deepest, to a band. Pairs nearer than `known_within` (m) are known: only what may bring one below the target that is as far apart is looked
+/// at. The motions are given as the body and as the obstacle sees them. Stops when `visit` returns false, and where there is no room for pairs of
+/// volumes that wait.
 pub(crate) fn for_deepest_triangle_pairs(
     trees: (&WideTree, &WideTree),
     (volumes, margin): (&FacingVolumes, f64),
-    (motions, target): ([&Motions; 2], f32),
+    (motions, known_within, target): ([&Motions; 2], f32, f32),
     (bands, turned): (&mut Bands, &mut TurnedNodes),
     work: &mut Work,
     wanted: impl Fn(u8, u8) -> bool,
@@ -44,6 +47,7 @@ pub(crate) fn for_deepest_triangle_pairs(
         body: Along::of(motions[0], trees.0),
         obstacle: Along::of(motions[1], trees.1),
         margin: margin as f32,
+        known_within: known_within * (1.0 - KNOWN_ROUNDING),
         target,
     };
     volumes.processor.dispatch(ByBand {
@@ -64,6 +68,7 @@ struct Deepest<'a> {
     obstacle: Along<'a>,
     /// m.
     margin: f32,
+    known_within: f32,
     target: f32,
 }
 
@@ -107,10 +112,10 @@ impl Order for Deepest<'_> {
         };
         let of_eight = eight.least(opened.first);
         let of_one = one.least(opened.other).0[opened.other as usize % LANES];
-        let (margin, scale) = (self.margin, 1.0 / self.margin);
+        let (margin, known_within, scale) = (self.margin, self.known_within, 1.0 / self.margin);
         let mut bands = [0; LANES];
         for (k, band) in bands.iter_mut().enumerate() {
-            let gap = larger(margin + opened.found.by.0[k], 0.0);
+            let gap = larger(margin + opened.found.by.0[k], known_within);
             let short = gap + larger(of_one, of_eight.0[k]) - self.target;
             let signed = signed_band_of(short * scale);
             let out_of_question = short > 0.0; // false for NaN

@@ -22,6 +22,8 @@ pub(crate) struct Violated<'a> {
     pub(crate) target: f64,
     /// No pair farther apart than this can, m.
     pub(crate) reach: f64,
+    /// Pairs that are nearer are known, m.
+    pub(crate) known_within: f64,
     /// Most pairs of triangles and features to look at.
     pub(crate) pairs: u64,
 }
@@ -60,7 +62,11 @@ pub(crate) fn for_violated(
     for_deepest_triangle_pairs(
         trees,
         (&volumes, asked.reach),
-        ([&of_body, &of_obstacle], asked.target as f32),
+        (
+            [&of_body, &of_obstacle],
+            asked.known_within as f32,
+            asked.target as f32,
+        ),
         (&mut workspace.bands, &mut workspace.turned),
         work,
         can_touch,
@@ -119,8 +125,8 @@ mod tests {
         (vertices, triangles)
     }
 
-    /// Rough squares that lie on each other, at any place in the world: every pair that some motion brings below the target is found, and few others are
-    /// looked at.
+    /// Rough squares that lie on each other, at any place in the world: every pair that some motion brings below the target is found but those that are
+    /// known, and few others are looked at.
     #[test]
     fn what_motions_violate_is_found_without_looking_at_all_that_is_near() {
         let (mut vertices, mut triangles) = rough(14, 5.5e-4, 3);
@@ -130,7 +136,7 @@ mod tests {
         let (vertices, triangles) = rough(24, 5e-4, 7);
         let obstacle = Mesh::new(vertices, triangles).expect("a closed block");
         let (reach, target) = (1e-4, 1e-6);
-        let (mut expected_in_all, mut looked_at, mut near) = (0, 0, 0);
+        let (mut expected_in_all, mut looked_at, mut near) = ([0; 2], [0; 2], 0);
         for k in 0..40_u32 {
             let u = f64::from(k);
             let world = Pose::new(Vector3::new(u, -u, 0.1 * u), Vector3::y() * (0.2 * u));
@@ -157,28 +163,37 @@ mod tests {
                 let row = contact_jacobian(&contact.normal, &contact.point_on_obstacle, &center);
                 motions.iter().any(|m| contact.gap + row.dot(m) < target)
             };
-            let violated = all.iter().filter(is_violated).map(|c| c.features);
-            let expected: BTreeSet<FeaturePair> = violated.collect();
+            let violated: Vec<&Contact> = all.iter().filter(is_violated).collect();
             near += work.triangle_pairs;
-            let before = work.triangle_pairs;
-            let mut found = BTreeSet::new();
-            let asked = Violated {
-                motions: &motions,
-                center,
-                target,
-                reach,
-                pairs: u64::MAX,
-            };
-            for_violated(placed[0], placed[1], 0, &asked, workspace, work, |c| {
-                found.insert(c.features);
-            });
-            looked_at += work.triangle_pairs - before;
-            let missing: Vec<_> = expected.difference(&found).collect();
-            assert!(missing.is_empty(), "{k}: {missing:?}");
-            expected_in_all += expected.len();
+            for (place, known_within) in [0.0, 5e-6].into_iter().enumerate() {
+                let unknown = violated.iter().filter(|c| c.gap > known_within);
+                let expected: BTreeSet<FeaturePair> = unknown.map(|c| c.features).collect();
+                let before = work.triangle_pairs;
+                let mut found = BTreeSet::new();
+                let asked = Violated {
+                    motions: &motions,
+                    center,
+                    target,
+                    reach,
+                    known_within,
+                    pairs: u64::MAX,
+                };
+                for_violated(placed[0], placed[1], 0, &asked, workspace, work, |c| {
+                    found.insert(c.features);
+                });
+                looked_at[place] += work.triangle_pairs - before;
+                let missing: Vec<_> = expected.difference(&found).collect();
+                assert!(missing.is_empty(), "{k}, {known_within}: {missing:?}");
+                expected_in_all[place] += expected.len();
+            }
         }
-        println!("{expected_in_all} violated, {looked_at} of {near} pairs of triangles");
-        assert!(expected_in_all > 1000, "{expected_in_all}");
-        assert!(4 * looked_at < 3 * near, "{looked_at} of {near}");
+        println!("{expected_in_all:?} violated, {looked_at:?} of {near} pairs of triangles");
+        assert!(expected_in_all[1] > 1000, "{expected_in_all:?}");
+        assert!(
+            expected_in_all[1] < expected_in_all[0],
+            "{expected_in_all:?}"
+        );
+        assert!(4 * looked_at[0] < 3 * near, "{looked_at:?} of {near}");
+        assert!(looked_at[1] < looked_at[0], "{looked_at:?}");
     }
 }

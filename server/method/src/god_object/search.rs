@@ -64,7 +64,8 @@ impl GodObject {
         };
         let target = at.rest_distance + nearer;
         let reach = (target + path).min(self.wanted.max(target)); // NaN is never reached
-        let beyond = reach > reduction.known_within(self.radius); // false for NaN
+        let known_within = reduction.known_within(self.radius);
+        let beyond = reach > known_within; // false for NaN
         if !beyond || !reach.is_finite() {
             return false;
         }
@@ -83,6 +84,7 @@ impl GodObject {
             center: at.center(),
             target: target - at.tolerance,
             reach,
+            known_within,
             pairs,
         };
         let surfaces = SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, None);
