@@ -21,6 +21,7 @@ mod god_object_convergence;
 mod god_object_flat_landing;
 mod god_object_peg_in_hole;
 mod implicit_constraints;
+mod late_updates;
 mod many_obstacles;
 mod mesh_distance;
 mod mesh_impact;
