@@ -67,6 +67,7 @@ impl GodObject {
     /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m, or those of them that are chosen.
     pub(super) fn collect(&mut self, distance: f64, work: &mut Work) {
         self.collected_within = distance;
+        self.searched.clear();
         self.note_places();
         self.collect_given(distance, work);
         if !self.refresh(distance, work) {

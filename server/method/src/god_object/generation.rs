@@ -82,14 +82,6 @@ impl GodObject {
         self.write_set();
     }
 
-    /// Adds those pairs to the candidates that a motion violates which is to be made, where surfaces conform. Whether there are any.
-    pub(super) fn search_along(&mut self, motion: &Vector6, report: &mut StepReport) -> bool {
-        let any = self.with_reduction(|this, reduction, at| {
-            this.search(reduction, at, &[*motion], Purpose::Motion, &mut report.work)
-        });
-        any == Some(true)
-    }
-
     /// Finds the rows that the force needs: for the device's present pose, and for those that it may take until the next set.
     pub(super) fn publish(
         &mut self,
@@ -141,7 +133,7 @@ impl GodObject {
     }
 
     /// What an act on the rows at the present pose says; `None` where no rows are chosen, or the pose is none.
-    fn with_reduction<T>(
+    pub(super) fn with_reduction<T>(
         &mut self,
         act: impl FnOnce(&mut Self, &mut RowReduction, &At) -> T,
     ) -> Option<T> {
@@ -188,10 +180,11 @@ impl GodObject {
     /// Adds rows until the answer of every motion violates no candidate.
     fn complete_for(&mut self, motions: &[Vector6], purpose: Purpose, work: &mut Work) {
         self.with_reduction(|this, reduction, at| {
-            let answers = this.answers(reduction, at, motions, purpose, work);
+            let mut answers = this.answers(reduction, at, motions, purpose, work);
             if this.search(reduction, at, &answers, purpose, work) {
-                this.answers(reduction, at, motions, purpose, work);
+                answers = this.answers(reduction, at, motions, purpose, work);
             }
+            this.searched = answers.iter().take(LEADING_MOTIONS).copied().collect();
             if reduction.is_full() {
                 // The first motion is the one that is made, or where the device is: others may have taken the place of its rows.
                 this.answers(reduction, at, &motions[..1], purpose, work);

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use arrayvec::ArrayVec;
 use nalgebra::Vector3;
 
 use super::carry::Carry;
 use super::collection::GivenRows;
+use super::generation::LEADING_MOTIONS;
 use super::placed_obstacle::PlacedObstacle;
 use super::substep::{StepMemory, Update};
 use super::{StartError, StepReport};
@@ -65,6 +67,8 @@ pub struct GodObject {
     pub(super) was_stopped: bool,
     /// The obstacle that cut this update's last motion short.
     pub(super) last_stop: Option<usize>,
+    /// Motions from here along which rows were searched for, for the force.
+    pub(super) searched: ArrayVec<Vector6, LEADING_MOTIONS>,
     /// Pairs of pieces that the last motion's search for impact looked at.
     pub(super) impact_pairs: u64,
     /// Distance within which the present set has every row, m.
@@ -140,6 +144,7 @@ impl GodObject {
             stopped: None,
             was_stopped: false,
             last_stop: None,
+            searched: ArrayVec::new(),
             impact_pairs: 0,
             collected_within: 0.0,
             affordable: settings.activation_distance + settings.look_ahead_limit,

@@ -275,13 +275,10 @@ impl StepMemory {
 
     /// Takes note of a projected motion, before it is made: one that turns back on the last says that the last went too far.
     pub(super) fn relax(&mut self, motion: &Vector6, radius: f64) {
-        let weighed = |a: &Vector6, b: &Vector6| {
-            linear(a).dot(&linear(b)) + radius * radius * angular(a).dot(&angular(b))
-        };
-        let along = weighed(motion, &self.last_motion);
+        let along = weighed(motion, &self.last_motion, radius);
         if along < 0.0 {
             // Aitken's extrapolation: motions in proportion to the way that is left would end here.
-            let ratio = along / weighed(&self.last_motion, &self.last_motion);
+            let ratio = along / weighed(&self.last_motion, &self.last_motion, radius);
             self.damping /= 1.0 - ratio;
         } else if along > 0.0 {
             // Not at once all: a peg at the mouth of its hole would go to and fro, and stay there.
@@ -289,4 +286,9 @@ impl StepMemory {
         }
         self.last_motion = *motion;
     }
+}
+
+/// Product of two motions, turns weighed by a radius, m^2.
+pub(super) fn weighed(a: &Vector6, b: &Vector6, radius: f64) -> f64 {
+    linear(a).dot(&linear(b)) + radius * radius * angular(a).dot(&angular(b))
 }
