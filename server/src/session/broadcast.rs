@@ -15,7 +15,7 @@ use taut_proto::state::{
     TOOL_FORCE_LIMITED, ToolState,
 };
 use taut_proto::{HotState, PoseF32};
-use taut_scene::{Carried, Carrier};
+use taut_scene::{Carried, Carrier, FidelityPlan};
 
 use crate::loops::shell::{Beat, run_at_deadlines};
 use crate::loops::wiring::SharedView;
@@ -113,11 +113,11 @@ impl StateWriter {
         Self { period, ..self }
     }
 
-    /// The same with no more than so many contacts in a state, the nearest.
+    /// The same with no more contacts in a state than the scene's choice of its fidelity allows, the nearest.
     #[must_use]
-    pub fn with_most_contacts(self, most_contacts: usize) -> Self {
+    pub fn with_fidelity(self, plan: Option<&FidelityPlan>) -> Self {
         Self {
-            most_contacts,
+            most_contacts: plan.map_or(self.most_contacts, |plan| plan.contacts as usize),
             ..self
         }
     }

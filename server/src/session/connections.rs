@@ -1,8 +1,10 @@
 //! What a session opens towards others before there are loops: network, device, head, a force from outside, and those who look on.
 
+use std::sync::Arc;
+
 use god_object::Settings;
 use taut_bridge::edge::offer_of;
-use taut_bridge::{Device, ExternalWrench, RemoteDevice};
+use taut_bridge::{ArmSwitch, ArmWish, Device, ExternalWrench, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{Content, JoinPolicy, ServerLink, ServerOptions};
 use tokio::runtime::Runtime;
@@ -84,6 +86,13 @@ impl Connections {
             runtime,
         };
         Ok((connections, device_side))
+    }
+
+    /// Lets clients who may ask for force, or for none.
+    pub(super) fn let_arm(&self, switch: Arc<ArmSwitch>) {
+        self.link.on_arm(move |arm| {
+            switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
+        });
     }
 
     /// The operator's page, where one is wanted.

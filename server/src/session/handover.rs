@@ -131,16 +131,16 @@ impl Handover {
         }
     }
 
-    /// The device of before in the place of one that was opened as that was, on the clock of `now`, which is of the session that gets it.
-    pub(super) fn device(&self, opened: DeviceSource, now: &mut Self) -> DeviceSource {
-        match (opened, lock(&self.device).take()) {
-            (DeviceSource::Local(_), Some(device)) if now.origin == self.origin => {
-                let later = now.clock.since(&self.clock);
-                let (device, ahead) = kept(device, self.ahead.clone(), later);
-                now.ahead = Some(ahead);
-                DeviceSource::Local(device)
-            }
-            (opened, _) => opened,
+    /// Puts the device of before in the place of one that was opened as that was, on the clock of `now`, which is of the session that gets it.
+    pub(super) fn give_device(&self, opened: &mut DeviceSource, now: &mut Self) {
+        let left = lock(&self.device).take();
+        if let (DeviceSource::Local(opened), Some(device)) = (opened, left)
+            && now.origin == self.origin
+        {
+            let later = now.clock.since(&self.clock);
+            let (device, ahead) = kept(device, self.ahead.clone(), later);
+            now.ahead = Some(ahead);
+            *opened = device;
         }
     }
 }

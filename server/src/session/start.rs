@@ -3,24 +3,24 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use god_object::{GodObject, Pose};
-use taut_bridge::ArmWish;
+use god_object::{GodObject, Pose, World};
 use taut_bridge::realtime::keep_cores_awake;
-use taut_link::proto;
+use taut_recording::Recorder;
+use taut_scene::Carried;
 
 use crate::loops::checker::PenetrationChecker;
 use crate::loops::incidents::IncidentCursor;
 use crate::loops::realtime::RealtimeLedger;
 use crate::loops::wiring::WiredLoops;
 use crate::session::audit::AuditTrail;
-use crate::session::broadcast::StateWriter;
+use crate::session::broadcast::{BridgeCommands, StateWriter};
 use crate::session::clients::ClientLedger;
 use crate::session::connections::{ConnectionSettings, Connections, coupling_offer};
 use crate::session::handover::{Beginning, Handover};
 use crate::session::monitor::{
     FreshRecording, MonitorFeed, MonitorPicture, MonitorSettings, MonitorSources, Severity,
 };
-use crate::session::operator::{Continuity, Facts};
+use crate::session::operator::{Continuity, Facts, OperatorPage};
 use crate::session::setup::content::own_colours;
 use crate::session::setup::{DeviceSource, SessionSetup};
 use crate::session::threads::SessionThreads;
@@ -57,20 +57,8 @@ impl Session {
         kept: &mut Continuity,
     ) -> Result<Self, Failure> {
         kept.switch.begin_again();
-        let mut handover = Handover::of(&setup);
-        let before = kept.handover.take();
-        let (on_traces, beginning) = match &before {
-            Some(before) => before.place(&mut setup),
-            None => (Duration::ZERO, Beginning::AtStart),
-        };
-        let god_object = Self::begin(&mut setup)?;
-
-        // The network, whose clock is everybody's; the device may be behind it.
-        let clock = SessionClock::start();
-        handover.begins_at(clock);
-        if let Some(before) = before {
-            setup.device = before.device(setup.device, &mut handover);
-        }
+        let from = StartingPoint::of(&mut setup, kept.handover.take())?;
+        let clock = from.clock;
         let to_monitor = ToMonitor::of(&setup);
         let facts = setup.operator.as_ref().map(|page| Facts::of(&setup, page));
         let scene_revision = setup.content.description.revision;
@@ -89,92 +77,44 @@ impl Session {
         let (mut connections, device_side) = Connections::open(wanted, clock, &ledger)?;
 
         let mut fresh = FreshRecording::default(); // dropped after what writes it
-        let recording = setup.recording.as_ref();
-        let recording = recording.map(|wanted| fresh.begin(wanted));
+        let recording = setup.recording.as_ref().map(|wanted| fresh.begin(wanted));
         let (taps, recorder) = recording.transpose()?.unzip();
-        let fidelity = setup.fidelity.map(Fidelity::of);
         // Figure 3.
         let loops = WiredLoops::new(
             &setup.world,
             &setup.settings,
-            god_object,
+            from.god_object,
             device_side.device,
             setup.safety,
             taps,
         )
         .with_motions(setup.motions)
-        .going_on_from(on_traces)
+        .going_on_from(from.on_traces)
         .with_external(device_side.external)
         .with_passed(device_side.passed)
         .with_arm_switch(kept.switch.clone());
-        let switch = loops.arm_switch.clone();
-        connections.link.on_arm(move |arm| {
-            switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
-        });
+        connections.let_arm(loops.arm_switch.clone());
         let wanted = setup.operator.as_ref().zip(facts);
         let operator =
             connections.start_operator(wanted, kept, &loops.statistics, clock, &policy)?;
-        let [head, watched_head] = connections.heads;
-        let most_contacts = fidelity
-            .as_ref()
-            .map_or(proto::state::MAX_CONTACTS, |f| f.plan.contacts as usize);
-        let reference_point = &setup.world.body.reference_point;
-        let readers = loops.readers;
-        let states = StateWriter::new(readers.broadcast, head, reference_point, scene_revision)
-            .with_most_contacts(most_contacts)
-            .with_carried(setup.world.obstacles.len(), &setup.carried);
-        let watch = fidelity.as_ref().map(|f| f.watch.clone());
-        let threads = SessionThreads {
-            coupling: loops.coupling,
-            god_object: loops.god_object.with_fidelity(watch),
-            haptics: loops.haptics,
-            waker: loops.coupling_waker,
-            checker: setup.checker.map(|checker| (checker, readers.checker)),
-            states,
-            broadcaster: connections.link.broadcaster(),
-            outlets: connections.outlets,
-            bridge: device_side.bridge,
-        };
-        let (grant, awake) = keep_cores_awake();
-        ledger.note("process", grant);
-        let mut session = Self {
+        let wired = WiredSession {
             clock,
-            started: clock.now(),
-            shutdown: Shutdown::default(),
             ledger,
-            statistics: loops.statistics,
-            wrench: readers.status,
-            arm_switch: loops.arm_switch,
-            incidents: IncidentCursor::default(),
-            stops_told: (0, Duration::ZERO),
-            fidelity,
-            network: Arc::default(),
-            clients: ClientLedger::default(),
-            audit: AuditTrail::default(),
-            external: external::ExternalTrail::default(),
-            _receiver: device_side.receiver,
-            threads: Vec::new(),
-            monitor: None,
+            loops,
+            fidelity: setup.fidelity.map(Fidelity::of),
+            receiver: device_side.receiver,
+            bridge: device_side.bridge,
             recorder,
-            observers: connections.observers,
             operator,
-            link: Some(connections.link),
-            handover: Arc::new(handover),
-            beginning,
-            makes_way: Arc::default(),
-            runtime: connections.runtime,
-            _awake: awake,
+            connections,
+            handover: from.handover,
+            beginning: from.beginning,
         };
+        let (threads, mut session, sources) =
+            wired.shared_out(&setup.world, &setup.carried, scene_revision, setup.checker);
 
         // From here on a failure drops the session, which ends what was started.
         if let Some(settings) = &setup.monitor {
-            let sources = MonitorSources {
-                head: watched_head,
-                shared: readers.monitor,
-                felt: readers.felt,
-                statistics: session.statistics.clone(),
-                clock,
-            };
             session.start_monitor(settings, &to_monitor.picture, sources, &mut fresh)?;
         }
         session.start_threads(threads, &setup.realtime)?;
@@ -214,6 +154,122 @@ impl Session {
                 &format!("real time not in force: {line}"),
             );
         }
+    }
+}
+
+/// Where a session begins: its clock, and the bodies and the device of the one before where those go on.
+struct StartingPoint {
+    clock: SessionClock,
+    god_object: GodObject,
+    on_traces: Duration,
+    beginning: Beginning,
+    handover: Handover,
+}
+
+impl StartingPoint {
+    fn of(setup: &mut SessionSetup, before: Option<Arc<Handover>>) -> Result<Self, Failure> {
+        let mut handover = Handover::of(setup);
+        let (on_traces, beginning) = match &before {
+            Some(before) => before.place(setup),
+            None => (Duration::ZERO, Beginning::AtStart),
+        };
+        let god_object = Session::begin(setup)?;
+        // The network's, and everybody's; the device may be behind it.
+        let clock = SessionClock::start();
+        handover.begins_at(clock);
+        if let Some(before) = before {
+            before.give_device(&mut setup.device, &mut handover);
+        }
+        Ok(Self {
+            clock,
+            god_object,
+            on_traces,
+            beginning,
+            handover,
+        })
+    }
+}
+
+/// A session that is opened and wired, of which nothing runs yet.
+struct WiredSession {
+    clock: SessionClock,
+    ledger: RealtimeLedger,
+    loops: WiredLoops,
+    fidelity: Option<Fidelity>,
+    receiver: Option<external::Receiver>,
+    bridge: Option<BridgeCommands>,
+    recorder: Option<Recorder>,
+    operator: Option<OperatorPage>,
+    connections: Connections,
+    handover: Handover,
+    beginning: Beginning,
+}
+
+impl WiredSession {
+    /// To its threads, to whoever holds it, and to its monitor.
+    fn shared_out(
+        self,
+        world: &World,
+        carried: &[Carried],
+        scene_revision: u32,
+        checker: Option<PenetrationChecker>,
+    ) -> (SessionThreads, Session, MonitorSources) {
+        let (loops, fidelity, connections) = (self.loops, self.fidelity, self.connections);
+        let (readers, [head, watched_head]) = (loops.readers, connections.heads);
+        let reference_point = &world.body.reference_point;
+        let states = StateWriter::new(readers.broadcast, head, reference_point, scene_revision)
+            .with_fidelity(fidelity.as_ref().map(|f| &f.plan))
+            .with_carried(world.obstacles.len(), carried);
+        let watch = fidelity.as_ref().map(|f| f.watch.clone());
+        let threads = SessionThreads {
+            coupling: loops.coupling,
+            god_object: loops.god_object.with_fidelity(watch),
+            haptics: loops.haptics,
+            waker: loops.coupling_waker,
+            checker: checker.map(|checker| (checker, readers.checker)),
+            states,
+            broadcaster: connections.link.broadcaster(),
+            outlets: connections.outlets,
+            bridge: self.bridge,
+        };
+        let sources = MonitorSources {
+            head: watched_head,
+            shared: readers.monitor,
+            felt: readers.felt,
+            statistics: loops.statistics.clone(),
+            clock: self.clock,
+        };
+        let (grant, awake) = keep_cores_awake();
+        self.ledger.note("process", grant);
+        let session = Session {
+            clock: self.clock,
+            started: self.clock.now(),
+            shutdown: Shutdown::default(),
+            ledger: self.ledger,
+            statistics: loops.statistics,
+            wrench: readers.status,
+            arm_switch: loops.arm_switch,
+            incidents: IncidentCursor::default(),
+            stops_told: (0, Duration::ZERO),
+            fidelity,
+            network: Arc::default(),
+            clients: ClientLedger::default(),
+            audit: AuditTrail::default(),
+            external: external::ExternalTrail::default(),
+            _receiver: self.receiver,
+            threads: Vec::new(),
+            monitor: None,
+            recorder: self.recorder,
+            observers: connections.observers,
+            operator: self.operator,
+            link: Some(connections.link),
+            handover: Arc::new(self.handover),
+            beginning: self.beginning,
+            makes_way: Arc::default(),
+            runtime: connections.runtime,
+            _awake: awake,
+        };
+        (threads, session, sources)
     }
 }
 
