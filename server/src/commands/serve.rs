@@ -33,18 +33,8 @@ pub(super) fn run(
     let workbench = load_workbench(args)?;
     taut_log::use_directives(&directives(workbench.log));
     let mut metrics = MetricsOutlets::open(args)?;
-    let overrides = Overrides {
-        scene: args.scene.clone(),
-        allow_unstable: args.allow_unstable,
-        quic: args.quic,
-        udp: args.udp,
-        no_monitor: args.no_monitor,
-        record: args.record.clone(),
-        recording: args.recording.clone(),
-        ..Overrides::default()
-    };
     let mut kept = Continuity::default();
-    let mut scene = LiveScene::new(args, overrides, kept.scenes.clone());
+    let mut scene = LiveScene::new(args, overrides(args), kept.scenes.clone());
     let mut next = scene.first()?;
     let end = EndFlag::listen().map_err(Failure::failed)?;
     taut_bridge::listen_at_console(&kept.switch);
@@ -96,6 +86,19 @@ pub(super) fn run(
                 return Ok(ended);
             }
         }
+    }
+}
+
+fn overrides(args: &ServeArgs) -> Overrides {
+    Overrides {
+        scene: args.scene.clone(),
+        allow_unstable: args.allow_unstable,
+        quic: args.quic,
+        udp: args.udp,
+        no_monitor: args.no_monitor,
+        record: args.record.clone(),
+        recording: args.recording.clone(),
+        ..Overrides::default()
     }
 }
 

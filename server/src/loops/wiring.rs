@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use god_object::{Coupling, GodObject, Settings, World};
 use taut_bridge::{ArmSwitch, Device, DevicePort, ExternalWrench, SafetySettings};
-use taut_recording::Taps;
+use taut_recording::{ForceRecord, HapticsRecord, Tap, Taps};
 use taut_scene::BuiltMotion;
 
 use super::coupling::CouplingLoop;
@@ -84,13 +84,7 @@ impl WiredLoops {
         let (felt_writer, felt) = felt_ticks::channel();
         let coupling_waker = Waker::default();
         let arm_switch = Arc::<ArmSwitch>::default();
-        let (haptics_tap, update_taps, force_tap) = taps.map_or((None, None, None), |taps| {
-            let updates = UpdateTaps {
-                updates: taps.updates,
-                constraints: taps.constraints,
-            };
-            (Some(taps.haptics), Some(updates), Some(taps.forces))
-        });
+        let (haptics_tap, update_taps, force_tap) = by_loop(taps);
 
         let god_object = GodObjectLoop::new(
             god_object,
@@ -117,12 +111,7 @@ impl WiredLoops {
         )
         .with_recording(haptics_tap)
         .with_felt(felt_writer);
-        let statistics = Statistics {
-            haptics: haptics.statistics(),
-            coupling: coupling.statistics(),
-            god_object: god_object.statistics(),
-            ..Statistics::default()
-        };
+        let statistics = Statistics::of(&haptics, &coupling, &god_object);
         let readers = SharedDataReaders {
             broadcast: SharedView {
                 device: device_readers.broadcast,
@@ -199,4 +188,21 @@ impl WiredLoops {
             ..self
         }
     }
+}
+
+fn by_loop(
+    taps: Option<Taps>,
+) -> (
+    Option<Tap<HapticsRecord>>,
+    Option<UpdateTaps>,
+    Option<Tap<ForceRecord>>,
+) {
+    let Some(taps) = taps else {
+        return (None, None, None);
+    };
+    let updates = UpdateTaps {
+        updates: taps.updates,
+        constraints: taps.constraints,
+    };
+    (Some(taps.haptics), Some(updates), Some(taps.forces))
 }

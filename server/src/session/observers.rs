@@ -109,22 +109,8 @@ impl ObserverServices {
         clock: SessionClock,
     ) -> Result<(Self, Outlets), Failure> {
         let (mut services, mut outlets) = (Self::default(), Outlets::default());
-        let vrpn = &settings.vrpn;
-        if vrpn.enabled {
-            let address = SocketAddrV4::new(vrpn.bind, vrpn.port);
-            let frame = VrpnFrame::of(scene)
-                .ok_or_else(|| Failure::failed("the scene's origin is no pose"))?;
-            let server = VrpnServer::start(
-                VrpnSettings {
-                    address,
-                    rate: vrpn.rate,
-                    tracker: vrpn.tracker.clone(),
-                    max_clients: vrpn.max_clients,
-                    frame,
-                },
-                outlets.add(),
-            );
-            services.vrpn = Some(server.map_err(|error| not_opened("vrpn", address, &error))?);
+        if settings.vrpn.enabled {
+            services.vrpn = Some(vrpn_server(&settings.vrpn, scene, outlets.add())?);
         }
         let hello = |rate| Hello {
             workbench: settings.workbench.clone(),
@@ -134,20 +120,8 @@ impl ObserverServices {
         };
         let stream = &settings.stream;
         if stream.enabled {
-            let address = SocketAddr::new(stream.bind, stream.port);
-            let server = StreamServer::start(
-                StreamSettings {
-                    address,
-                    rate: stream.rate,
-                    token: settings.token.clone(),
-                    max_observers: stream.max_observers,
-                    naming: event_name,
-                },
-                &hello(stream.rate),
-                outlets.add(),
-            );
-            services.stream =
-                Some(server.map_err(|error| not_opened("observers", address, &error))?);
+            let server = stream_server(settings, &hello(stream.rate), outlets.add())?;
+            services.stream = Some(server);
         }
         #[cfg(feature = "zenoh")]
         if settings.zenoh.enabled {
@@ -230,6 +204,41 @@ impl ObserverServices {
         }
         lines
     }
+}
+
+fn vrpn_server(
+    wanted: &Vrpn,
+    scene: &SceneDescription,
+    feed: StateFeed,
+) -> Result<VrpnServer, Failure> {
+    let address = SocketAddrV4::new(wanted.bind, wanted.port);
+    let settings = VrpnSettings {
+        address,
+        rate: wanted.rate,
+        tracker: wanted.tracker.clone(),
+        max_clients: wanted.max_clients,
+        frame: VrpnFrame::of(scene)
+            .ok_or_else(|| Failure::failed("the scene's origin is no pose"))?,
+    };
+    VrpnServer::start(settings, feed).map_err(|error| not_opened("vrpn", address, &error))
+}
+
+fn stream_server(
+    wanted: &ObserverSettings,
+    hello: &Hello,
+    feed: StateFeed,
+) -> Result<StreamServer, Failure> {
+    let stream = &wanted.stream;
+    let address = SocketAddr::new(stream.bind, stream.port);
+    let settings = StreamSettings {
+        address,
+        rate: stream.rate,
+        token: wanted.token.clone(),
+        max_observers: stream.max_observers,
+        naming: event_name,
+    };
+    StreamServer::start(settings, hello, feed)
+        .map_err(|error| not_opened("observers", address, &error))
 }
 
 /// What the device port's events are called.

@@ -3,8 +3,9 @@
 
 mod children;
 mod directory;
+mod ports;
 
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -16,6 +17,7 @@ use taut_scene::{Device, HeadTracking, Scene, Workbench};
 use crate::cli::DemoArgs;
 use crate::commands::demo::children::{NamedChild, wait_or_kill};
 use crate::commands::demo::directory::DemoDirectory;
+use crate::commands::demo::ports::use_free_ports;
 use crate::commands::serve::{HELP_ARM, announce, watch};
 use crate::commands::{recording_size, render};
 use crate::loops::realtime::after_parent;
@@ -23,8 +25,8 @@ use crate::report::SessionReport;
 use crate::report::terminal::Terminal;
 use crate::session::Session;
 use crate::session::monitor::MonitorFeed;
+use crate::session::setup::DeviceSource;
 use crate::session::setup::workbench::{Overrides, session_setup};
-use crate::session::setup::{DeviceSource, SessionSetup};
 use crate::shared::failure::Failure;
 
 /// Children have this long to end by themselves once the server closed.
@@ -65,18 +67,7 @@ pub(super) fn run(
         None
     };
     use_device(&mut workbench, &choice, args.bridge);
-    let overrides = Overrides {
-        scene: Some(scene),
-        allow_unstable: args.allow_unstable,
-        no_monitor: args.no_monitor || !MonitorFeed::BUILT_IN,
-        record: args.record.clone(),
-        input: match choice {
-            DeviceChoice::Input(input) if !args.bridge => Some(input),
-            _ => None,
-        },
-        recording: args.recording.clone(),
-        ..Overrides::default()
-    };
+    let overrides = overrides(args, scene, choice);
     let mut setup = session_setup(&workbench, key, &overrides)?;
     // A scene that is refused gets its one sentence and nothing else, so other lines come after this.
     if !MonitorFeed::BUILT_IN {
@@ -86,10 +77,7 @@ pub(super) fn run(
         // Drawing shares the processor with the mouse; a pose that is late harms nobody who feels no force.
         *max_age = MOUSE_MAX_AGE;
     }
-    if let Some(first) = args.port {
-        use_ports(&mut setup, first);
-    }
-    take_free_ports(&mut setup, terminal);
+    use_free_ports(&mut setup, args.port, terminal);
     let end = EndFlag::listen().map_err(Failure::failed)?;
     let mut session = Session::start(setup)?;
     session.end_with(&end);
@@ -117,7 +105,6 @@ pub(super) fn run(
     children.iter().for_each(NamedChild::mute);
     let (report, failure) = session.stop(terminal);
     let early = (!early.is_empty()).then(|| Failure::Failed(early.join(", ")));
-    let ended = (report, failure.or(early));
     end.let_signals_kill();
     children.iter_mut().for_each(NamedChild::interrupt);
     for name in wait_or_kill(children, GRACE) {
@@ -125,7 +112,22 @@ pub(super) fn run(
             "taut: {name} did not end by itself and was killed"
         ));
     }
-    Ok(ended)
+    Ok((report, failure.or(early)))
+}
+
+fn overrides(args: &DemoArgs, scene: String, choice: DeviceChoice) -> Overrides {
+    Overrides {
+        scene: Some(scene),
+        allow_unstable: args.allow_unstable,
+        no_monitor: args.no_monitor || !MonitorFeed::BUILT_IN,
+        record: args.record.clone(),
+        input: match choice {
+            DeviceChoice::Input(input) if !args.bridge => Some(input),
+            _ => None,
+        },
+        recording: args.recording.clone(),
+        ..Overrides::default()
+    }
 }
 
 /// Lets the chosen device move the god-object; the mouse and a bridge are remote ones.
@@ -195,49 +197,6 @@ fn watch_all(
         true
     });
     early
-}
-
-/// Puts the demo on four ports from `first` on, or on free ones where that is 0.
-fn use_ports(setup: &mut SessionSetup, first: u16) {
-    let port = |index: u16| {
-        if first == 0 {
-            0
-        } else {
-            first.saturating_add(index)
-        }
-    };
-    setup.link.quic.set_port(port(0));
-    setup.link.udp.set_port(port(1));
-    if let Some(monitor) = &mut setup.monitor {
-        (monitor.grpc_port, monitor.web_port) = (port(2), port(3));
-    }
-}
-
-/// Replaces every port that somebody else has by a free one, and says so.
-fn take_free_ports(setup: &mut SessionSetup, terminal: &Terminal) {
-    let make_usable = |port: &mut u16, is_free: bool, what: &str| {
-        if !is_free {
-            terminal.say(&format!("port {port} is in use; {what} takes a free one"));
-            *port = 0;
-        }
-    };
-    for (address, what) in [
-        (&mut setup.link.quic, "the control plane"),
-        (&mut setup.link.udp, "the pose stream"),
-    ] {
-        let mut port = address.port();
-        make_usable(&mut port, UdpSocket::bind(*address).is_ok(), what);
-        address.set_port(port);
-    }
-    if let Some(monitor) = setup.monitor.as_mut().filter(|monitor| monitor.serve) {
-        for (port, what) in [
-            (&mut monitor.grpc_port, "the monitor's stream"),
-            (&mut monitor.web_port, "the monitor's page"),
-        ] {
-            let is_free = TcpListener::bind((monitor.bind, *port)).is_ok();
-            make_usable(port, is_free, what);
-        }
-    }
 }
 
 /// The intention of the scene's hand as a file for the bridge, and how the hand holds.

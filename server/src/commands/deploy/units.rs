@@ -42,37 +42,12 @@ pub(super) fn units(
     follow_scene: bool,
 ) -> Result<Vec<Unit>, Failure> {
     let mut units = Vec::new();
-    let system = |name: &str, text| Unit {
-        name: name.to_owned(),
-        is_session: false,
-        text,
-    };
     let client = Client {
         server,
         transport: workbench.network.transport,
     };
     if machine.server {
-        let mut command =
-            "taut serve --config /etc/taut/workbench.toml --key /etc/taut/cluster.key".to_owned();
-        if follow_scene {
-            command.push_str(" --follow-scene");
-        }
-        let mut more = match &workbench.device {
-            Device::Driver(chosen) => {
-                let reached = DeviceChoice::of(chosen)
-                    .map_err(|error| error.to_string())
-                    .and_then(|choice| choice.as_ref().map_or(Ok(Vec::new()), allowed));
-                reached.map_err(|why| {
-                    Failure::BadInput(format!("[device] of kind \"{}\": {why}", chosen.kind.name))
-                })?
-            }
-            _ => Vec::new(),
-        };
-        more.push("Environment=TAUT_DATA=/etc/taut/data".to_owned());
-        units.push(system(
-            "taut-serve.service",
-            filled(SERVE, machine, &command, &more),
-        ));
+        units.push(server_unit(&workbench.device, machine, follow_scene)?);
     }
     if let Some(device) = &machine.device {
         let command = client.command("bridge", "device", &["--device", device])?;
@@ -106,6 +81,38 @@ pub(super) fn units(
         });
     }
     Ok(units)
+}
+
+fn server_unit(device: &Device, machine: &Machine, follow_scene: bool) -> Result<Unit, Failure> {
+    let mut command =
+        "taut serve --config /etc/taut/workbench.toml --key /etc/taut/cluster.key".to_owned();
+    if follow_scene {
+        command.push_str(" --follow-scene");
+    }
+    let mut more = match device {
+        Device::Driver(chosen) => {
+            let reached = DeviceChoice::of(chosen)
+                .map_err(|error| error.to_string())
+                .and_then(|choice| choice.as_ref().map_or(Ok(Vec::new()), allowed));
+            reached.map_err(|why| {
+                Failure::BadInput(format!("[device] of kind \"{}\": {why}", chosen.kind.name))
+            })?
+        }
+        _ => Vec::new(),
+    };
+    more.push("Environment=TAUT_DATA=/etc/taut/data".to_owned());
+    Ok(system(
+        "taut-serve.service",
+        filled(SERVE, machine, &command, &more),
+    ))
+}
+
+fn system(name: &str, text: String) -> Unit {
+    Unit {
+        name: name.to_owned(),
+        is_session: false,
+        text,
+    }
 }
 
 /// How clients of this workbench find their server.

@@ -103,39 +103,11 @@ fn ask(
         )?,
         address: address(questions, "address of the haptic PC", found.address, &[])?,
     };
-    let mut walls: Vec<Wall> = Vec::new();
     let mut pcs: Vec<Pc> = vec![server];
-    for place in Place::ALL.into_iter().take(screens) {
-        let screen = place.name();
-        let (width, height) = place.size();
-        let width = questions.number(
-            &format!("width of {screen}"),
-            "m, the picture alone, without its frame",
-            width,
-            SIDE,
-        )?;
-        let height = questions.number(&format!("height of {screen}"), "m", height, SIDE)?;
-        let known: Vec<&str> = pcs.iter().map(|pc| pc.name.as_str()).collect();
-        let what = format!("the PC that draws {screen}");
-        let hint = format!("a name; known so far: {}", known.join(", "));
-        let pc = questions.text(&what, &hint, &format!("render-{screen}"), plain)?;
-        let drawn_by = match pcs.iter().position(|known| known.name == pc) {
-            Some(known) => known,
-            None => {
-                let taken: Vec<IpAddr> = pcs.iter().map(|pc| pc.address).collect();
-                let next = found::next_address(&taken, found.address);
-                let address = address(questions, &format!("address of {pc}"), next, &taken)?;
-                pcs.push(Pc { name: pc, address });
-                pcs.len() - 1
-            }
-        };
-        walls.push(Wall {
-            place,
-            width,
-            height,
-            drawn_by,
-        });
-    }
+    let places = Place::ALL.into_iter().take(screens);
+    let walls = places
+        .map(|place| wall(questions, place, &mut pcs, found.address))
+        .collect::<Result<_, _>>()?;
     let stereo = stereo(questions)?;
     let device = questions.text(
         "the haptic device",
@@ -153,6 +125,44 @@ fn ask(
         device,
         pcs,
         window: found.window(),
+    })
+}
+
+/// A screen, whose PC comes to `pcs` if it is a new one.
+fn wall(
+    questions: &mut Questions<impl BufRead, impl Write>,
+    place: Place,
+    pcs: &mut Vec<Pc>,
+    this_pc: IpAddr,
+) -> Result<Wall, Failure> {
+    let screen = place.name();
+    let (width, height) = place.size();
+    let width = questions.number(
+        &format!("width of {screen}"),
+        "m, the picture alone, without its frame",
+        width,
+        SIDE,
+    )?;
+    let height = questions.number(&format!("height of {screen}"), "m", height, SIDE)?;
+    let known: Vec<&str> = pcs.iter().map(|pc| pc.name.as_str()).collect();
+    let what = format!("the PC that draws {screen}");
+    let hint = format!("a name; known so far: {}", known.join(", "));
+    let pc = questions.text(&what, &hint, &format!("render-{screen}"), plain)?;
+    let drawn_by = match pcs.iter().position(|known| known.name == pc) {
+        Some(known) => known,
+        None => {
+            let taken: Vec<IpAddr> = pcs.iter().map(|pc| pc.address).collect();
+            let next = found::next_address(&taken, this_pc);
+            let address = address(questions, &format!("address of {pc}"), next, &taken)?;
+            pcs.push(Pc { name: pc, address });
+            pcs.len() - 1
+        }
+    };
+    Ok(Wall {
+        place,
+        width,
+        height,
+        drawn_by,
     })
 }
 

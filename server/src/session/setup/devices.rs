@@ -60,8 +60,24 @@ pub fn device(
     }
 }
 
+/// What moves the god-object, the driver's device where one is chosen and else the workbench's, and what it was opened by.
+pub(super) fn chosen_device(
+    wanted: &taut_scene::Device,
+    choice: Option<&InputChoice>,
+    scene: &BuiltScene,
+    workbench_from_scene: &Pose,
+    priority: u8,
+) -> Result<(DeviceSource, DeviceOrigin), Failure> {
+    let origin = origin(wanted, choice, scene, workbench_from_scene);
+    let device = match choice {
+        Some(choice) => input(choice, scene, workbench_from_scene, priority)?,
+        None => device(wanted, scene, workbench_from_scene)?,
+    };
+    Ok((device, origin))
+}
+
 /// All that the device depends on when it is opened.
-pub(super) fn origin(
+fn origin(
     wanted: &taut_scene::Device,
     input: Option<&InputChoice>,
     scene: &BuiltScene,

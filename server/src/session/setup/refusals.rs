@@ -126,7 +126,7 @@ pub(super) fn few_motions(built: &BuiltScene) -> Result<(), Failure> {
 const SETS_HZ: f64 = 1000.0;
 
 /// Refuses a number that no program of the cluster takes from another; a warning where the force of a device behind a network is computed here.
-pub(super) fn where_coupled(
+fn where_coupled(
     built: &BuiltScene,
     workbench: &Workbench,
     overrides: &Overrides,
@@ -148,8 +148,24 @@ pub(in crate::session) fn unencodable(error: EncodeError) -> Failure {
     ))
 }
 
+/// What is to be known of scene and device together, logged; or the refusal.
+pub(super) fn warned_of(
+    built: &BuiltScene,
+    workbench: &Workbench,
+    choice: Option<&InputChoice>,
+    overrides: &Overrides,
+) -> Result<Vec<String>, Failure> {
+    let declared = dynamics_of(workbench, overrides, choice, built)?;
+    let mut warnings = borne(declared, built, overrides.allow_unstable)?;
+    warnings.extend(where_coupled(built, workbench, overrides)?);
+    for warning in &warnings {
+        tracing::warn!("{warning}");
+    }
+    Ok(warnings)
+}
+
 /// What is known of the device, and whether it renders torque.
-pub(super) fn dynamics_of(
+fn dynamics_of(
     workbench: &Workbench,
     overrides: &Overrides,
     choice: Option<&InputChoice>,
@@ -171,7 +187,7 @@ pub(super) fn dynamics_of(
 }
 
 /// Whether the device bears the scene's stiffness: warnings, or the refusal.
-pub(super) fn borne(
+fn borne(
     declared: Option<(DeviceDynamics, bool)>,
     built: &BuiltScene,
     allow_unstable: bool,

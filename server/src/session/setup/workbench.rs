@@ -24,11 +24,9 @@ use crate::session::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
-use crate::session::setup::devices::{device, input, origin as device_origin};
+use crate::session::setup::devices::chosen_device;
 use crate::session::setup::monitoring::monitor;
-use crate::session::setup::refusals::{
-    borne, dynamics_of, few_motions, no_token_is_the_key, where_coupled,
-};
+use crate::session::setup::refusals::{few_motions, no_token_is_the_key, warned_of};
 use crate::session::setup::stability::stiffnesses;
 use crate::session::setup::{
     ExternalSetup, LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup,
@@ -72,27 +70,28 @@ pub struct Overrides {
     pub recording: Option<PathBuf>,
 }
 
+impl Overrides {
+    fn scene_of(&self, workbench: &Workbench) -> Result<Scene, Failure> {
+        Ok(match (&self.edited, &self.scene) {
+            (Some(edited), _) => edited.clone(),
+            (None, Some(named)) => Scene::named_or_file(named)?,
+            (None, None) => workbench.load_scene()?,
+        })
+    }
+}
+
 /// Puts the session together. Files are read and checked, nothing is started.
 pub fn session_setup(
     workbench: &Workbench,
     key: ClusterKey,
     overrides: &Overrides,
 ) -> Result<SessionSetup, Failure> {
-    let scene = match (&overrides.edited, &overrides.scene) {
-        (Some(edited), _) => edited.clone(),
-        (None, Some(named)) => Scene::named_or_file(named)?,
-        (None, None) => workbench.load_scene()?,
-    };
+    let scene = overrides.scene_of(workbench)?;
     let built = scene.build_from(overrides.prepared.as_ref())?;
     few_motions(&built)?;
     no_token_is_the_key(workbench, &key)?;
     let choice = driver(workbench, overrides)?;
-    let declared = dynamics_of(workbench, overrides, choice.as_ref(), &built)?;
-    let mut warnings = borne(declared, &built, overrides.allow_unstable)?;
-    warnings.extend(where_coupled(&built, workbench, overrides)?);
-    for warning in &warnings {
-        tracing::warn!("{warning}");
-    }
+    let warnings = warned_of(&built, workbench, choice.as_ref(), overrides)?;
     let workbench_from_scene = workbench.workbench_from_scene(&scene);
     let content = content(&built, workbench, &workbench_from_scene)?;
     let link = link(workbench, key, overrides)?;
@@ -113,21 +112,13 @@ pub fn session_setup(
         let at_bridge = choice.is_none() && workbench.device == Device::Remote;
         crate::session::setup::fidelity::apply(plan, &mut realtime, rate_is_set, at_bridge);
     }
-    let device_origin = device_origin(
+    let (device, device_origin) = chosen_device(
         &workbench.device,
         choice.as_ref(),
         &built,
         &workbench_from_scene,
-    );
-    let device = match &choice {
-        Some(choice) => input(
-            choice,
-            &built,
-            &workbench_from_scene,
-            realtime.haptics_priority,
-        )?,
-        None => device(&workbench.device, &built, &workbench_from_scene)?,
-    };
+        realtime.haptics_priority,
+    )?;
     let world = Arc::new(built.world);
     let prepared = Prepared::new(world.clone(), built.sources);
     Ok(SessionSetup {
