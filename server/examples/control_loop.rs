@@ -21,7 +21,8 @@ use taut_bridge::realtime::{
 };
 use taut_link::Distribution;
 use taut_spidar::{
-    ForwardKinematics, Geometry, Pose, StringMatrix, TensionSettings, TensionSolver,
+    ForwardKinematics, Geometry, PerString, Pose, StringMatrix, TensionAnswer, TensionSettings,
+    TensionSolver,
 };
 
 /// Of the haptics loop.
@@ -32,6 +33,50 @@ const TURN: u32 = 500;
 /// Places of the millisecond for `--by-phase`, us; the kernel's tick is at 0.
 const PHASES_US: [u64; 10] = [0, 50, 150, 250, 400, 550, 700, 850, 950, 975];
 
+/// What is computed in every tick.
+struct Computation {
+    geometry: Geometry,
+    kinematics: ForwardKinematics,
+    solver: TensionSolver,
+    pose: Pose,
+    /// Where it was a millisecond ago, at 0.1 m/s: as many steps as in a session.
+    before: Pose,
+    lengths: PerString,
+    wrench: Vector6,
+}
+
+impl Computation {
+    fn new() -> Result<Self, &'static str> {
+        let geometry = Geometry::shipped("wb").ok_or("wb is shipped")?;
+        // Turned so far that zero wrench cannot be rendered: the dear case.
+        let pose = Pose::new(
+            Vector3::new(0.05, -0.03, 0.02),
+            Vector3::new(0.5, 0.3, -0.4),
+        );
+        Ok(Self {
+            kinematics: ForwardKinematics::new(&geometry),
+            solver: TensionSolver::new(&geometry, TensionSettings::default()),
+            pose,
+            before: Pose::from_parts(
+                (pose.translation.vector - Vector3::new(1e-4, 0.0, 0.0)).into(),
+                pose.rotation,
+            ),
+            lengths: geometry.lengths(&pose),
+            wrench: Vector6::new(1.0, -2.0, 0.5, 0.02, 0.01, -0.03),
+            geometry,
+        })
+    }
+
+    fn answer(&mut self) -> TensionAnswer {
+        self.kinematics.start_at(self.before);
+        let strings = self.kinematics.solve(&self.lengths).map_or_else(
+            |_| StringMatrix::at(&self.geometry, &self.pose),
+            |answer| answer.strings,
+        );
+        self.solver.distribute(&strings, &self.wrench)
+    }
+}
+
 /// What one place of the millisecond saw.
 #[derive(Default)]
 struct Seen {
@@ -40,6 +85,44 @@ struct Seen {
     wall: Histogram,
     late: Histogram,
     misses: u32,
+}
+
+impl Seen {
+    fn take_turn(&mut self, phase: Duration, computation: &mut Computation) {
+        let mut deadline = first_on_beat(monotonic_now(), PERIOD, phase);
+        for _ in 0..TURN {
+            sleep_until(deadline);
+            let woken = monotonic_now();
+            let before = thread_cpu_time();
+            let first = std::hint::black_box(computation.answer());
+            let between = thread_cpu_time();
+            let done = monotonic_now();
+            let second = std::hint::black_box(computation.answer());
+            let after = thread_cpu_time();
+            assert_eq!(first.tensions, second.tensions);
+            self.cold.record_time(between.saturating_sub(before));
+            self.warm.record_time(after.saturating_sub(between));
+            self.wall.record_time(done.saturating_sub(woken));
+            self.late.record_time(woken.saturating_sub(deadline));
+            deadline += PERIOD;
+            if done > deadline {
+                self.misses += 1;
+                deadline = first_on_beat(done, PERIOD, phase);
+            }
+        }
+    }
+
+    fn print(&self, phase: Duration) {
+        println!(
+            "due {:.3} ms after the millisecond, deadlines missed: {}",
+            phase.as_secs_f64() * 1e3,
+            self.misses
+        );
+        show("CPU, after the sleep", &self.cold.distribution_us());
+        show("CPU, again at once", &self.warm.distribution_us());
+        show("elapsed, after the sleep", &self.wall.distribution_us());
+        show("woken late by", &self.late.distribution_us());
+    }
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -61,72 +144,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{}", request_fifo(PRIORITY));
     println!("load of the machine: {}", first_line("/proc/loadavg"));
 
-    let geometry = Geometry::shipped("wb").ok_or("wb is shipped")?;
-    // Turned so far that zero wrench cannot be rendered: the dear case.
-    let pose = Pose::new(
-        Vector3::new(0.05, -0.03, 0.02),
-        Vector3::new(0.5, 0.3, -0.4),
-    );
-    let lengths = geometry.lengths(&pose);
-    let wrench = Vector6::new(1.0, -2.0, 0.5, 0.02, 0.01, -0.03);
-    let mut kinematics = ForwardKinematics::new(&geometry);
-    let mut solver = TensionSolver::new(&geometry, TensionSettings::default());
-    // Where it was a millisecond ago, at 0.1 m/s: as many steps as in a session.
-    let before = Pose::from_parts(
-        (pose.translation.vector - Vector3::new(1e-4, 0.0, 0.0)).into(),
-        pose.rotation,
-    );
-    let mut compute = || {
-        kinematics.start_at(before);
-        let strings = kinematics.solve(&lengths).map_or_else(
-            |_| StringMatrix::at(&geometry, &pose),
-            |answer| answer.strings,
-        );
-        solver.distribute(&strings, &wrench)
-    };
+    let mut computation = Computation::new()?;
     println!(
         "each tick: {:?}, {} factorisations",
-        compute().status,
-        compute().factorisations
+        computation.answer().status,
+        computation.answer().factorisations
     );
-
     let mut seen: Vec<Seen> = phases.iter().map(|_| Seen::default()).collect();
     for turn in 0..1000 * seconds / TURN {
         let which = turn as usize % phases.len();
-        let seen = &mut seen[which];
-        let mut deadline = first_on_beat(monotonic_now(), PERIOD, phases[which]);
-        for _ in 0..TURN {
-            sleep_until(deadline);
-            let woken = monotonic_now();
-            let before = thread_cpu_time();
-            let first = std::hint::black_box(compute());
-            let between = thread_cpu_time();
-            let done = monotonic_now();
-            let second = std::hint::black_box(compute());
-            let after = thread_cpu_time();
-            assert_eq!(first.tensions, second.tensions);
-            seen.cold.record_time(between.saturating_sub(before));
-            seen.warm.record_time(after.saturating_sub(between));
-            seen.wall.record_time(done.saturating_sub(woken));
-            seen.late.record_time(woken.saturating_sub(deadline));
-            deadline += PERIOD;
-            if done > deadline {
-                seen.misses += 1;
-                deadline = first_on_beat(done, PERIOD, phases[which]);
-            }
-        }
+        seen[which].take_turn(phases[which], &mut computation);
     }
     drop(awake);
     for (phase, seen) in phases.iter().zip(&seen) {
-        println!(
-            "due {:.3} ms after the millisecond, deadlines missed: {}",
-            phase.as_secs_f64() * 1e3,
-            seen.misses
-        );
-        show("CPU, after the sleep", &seen.cold.distribution_us());
-        show("CPU, again at once", &seen.warm.distribution_us());
-        show("elapsed, after the sleep", &seen.wall.distribution_us());
-        show("woken late by", &seen.late.distribution_us());
+        seen.print(*phase);
     }
     println!("load of the machine: {}", first_line("/proc/loadavg"));
     for line in std::fs::read_to_string("/proc/thread-self/status")?.lines() {

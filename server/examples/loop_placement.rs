@@ -40,31 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let seconds = numbers.first().copied().unwrap_or(10);
     let turns = numbers.get(1).copied().unwrap_or(3);
 
-    let us = Duration::from_micros;
-    let all_at = |at| Phases {
-        haptics: at,
-        god_object: at,
-        broadcast: at,
-    };
-    let cases = [
-        ("as the program has them", Phases::default(), None),
-        ("all due at 0.25 ms", all_at(us(250)), None),
-        (
-            "haptics due at 0.97 ms, just before the kernel, others after it as usual",
-            Phases {
-                haptics: us(970),
-                god_object: us(1170),
-                broadcast: us(1470),
-            },
-            None,
-        ),
-        ("all due at 0.97 ms", all_at(us(970)), None),
-        (
-            "as the program has them, haptics on core 0, coupling on core 1",
-            Phases::default(),
-            Some((0, 1)),
-        ),
-    ];
+    let cases = cases();
     let end = Arc::new(AtomicBool::new(false));
     let streamers: Vec<_> = (0..if busy { 2 } else { 0 })
         .map(|_| stream(end.clone()))
@@ -84,28 +60,64 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     for ((name, ..), reports) in cases.iter().zip(&reports) {
         println!("{name}");
-        let show = |what: &str, of: &dyn Fn(&SessionReport) -> Distribution| {
-            let of_turn: Vec<Distribution> = reports.iter().map(of).collect();
-            println!(
-                "  {what:24} p50 {}  p99 {}  p99.9 {} us",
-                each(&of_turn, |d| d.p50),
-                each(&of_turn, |d| d.p99),
-                each(&of_turn, |d| d.p999)
-            );
-        };
-        show("sample to force begun", &|r| r.answer_wait_us);
-        show("sample to force rendered", &|r| r.force_latency_us);
-        show("coupling and tensions", &|r| {
-            r.coupling_and_tension_us.unwrap_or_default()
-        });
-        show("constraints rendered", &|r| r.constraint_latency_us);
-        let missed: Vec<String> = reports
-            .iter()
-            .map(|report| report.deadline_misses.to_string())
-            .collect();
-        println!("  deadlines missed         {}", missed.join(" / "));
+        print_turns(reports);
     }
     Ok(())
+}
+
+/// Name, places within the millisecond, and the cores of haptics and coupling.
+type Case = (&'static str, Phases, Option<(usize, usize)>);
+
+fn cases() -> [Case; 5] {
+    let us = Duration::from_micros;
+    let all_at = |at| Phases {
+        haptics: at,
+        god_object: at,
+        broadcast: at,
+    };
+    [
+        ("as the program has them", Phases::default(), None),
+        ("all due at 0.25 ms", all_at(us(250)), None),
+        (
+            "haptics due at 0.97 ms, just before the kernel, others after it as usual",
+            Phases {
+                haptics: us(970),
+                god_object: us(1170),
+                broadcast: us(1470),
+            },
+            None,
+        ),
+        ("all due at 0.97 ms", all_at(us(970)), None),
+        (
+            "as the program has them, haptics on core 0, coupling on core 1",
+            Phases::default(),
+            Some((0, 1)),
+        ),
+    ]
+}
+
+/// The turns of one case.
+fn print_turns(reports: &[SessionReport]) {
+    let show = |what: &str, of: &dyn Fn(&SessionReport) -> Distribution| {
+        let of_turn: Vec<Distribution> = reports.iter().map(of).collect();
+        println!(
+            "  {what:24} p50 {}  p99 {}  p99.9 {} us",
+            each(&of_turn, |d| d.p50),
+            each(&of_turn, |d| d.p99),
+            each(&of_turn, |d| d.p999)
+        );
+    };
+    show("sample to force begun", &|r| r.answer_wait_us);
+    show("sample to force rendered", &|r| r.force_latency_us);
+    show("coupling and tensions", &|r| {
+        r.coupling_and_tension_us.unwrap_or_default()
+    });
+    show("constraints rendered", &|r| r.constraint_latency_us);
+    let missed: Vec<String> = reports
+        .iter()
+        .map(|report| report.deadline_misses.to_string())
+        .collect();
+    println!("  deadlines missed         {}", missed.join(" / "));
 }
 
 /// The median of the turns, and all of them in ascending order.

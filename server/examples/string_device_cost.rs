@@ -17,7 +17,7 @@ use taut_bridge::{
     Device, DeviceFault, DeviceInfo, DeviceSample, Felt, Hand, HeldStrings, MinJerkPath,
     SafetySettings, SpidarDevice, ViaPoint, simulated_spidar, string_geometry,
 };
-use taut_scene::Scene;
+use taut_scene::{BuiltScene, Scene};
 use taut_spidar::TensionStatus;
 
 /// The demo's.
@@ -74,25 +74,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let seconds: u32 = arguments.next().map_or(Ok(60), |text| text.parse())?;
 
     let scene = Scene::named_or_file(SCENE)?.build()?;
-    let hand = scene.hand.as_ref().ok_or("the scene has no hand")?;
-    let via = hand.path.samples().iter().map(|sample| ViaPoint {
-        time_s: sample.time,
-        pose: sample.pose,
-    });
-    let made = simulated_spidar(
-        string_geometry(&strings)?,
-        UnitQuaternion::identity(),
-        scene.reference_point(),
-        Hand::FIRM,
-        MinJerkPath::new(via.collect(), hand.repeat)?,
-        None,
-    )?;
-    if let Some(warning) = &made.warning {
-        println!("{warning}");
-    }
     let ticks = Arc::new(Mutex::new(Vec::with_capacity(1000 * seconds as usize)));
     let device = Watched {
-        device: made.device.with_clock(thread_cpu_time),
+        device: held_strings(&strings, &scene)?.with_clock(thread_cpu_time),
         ticks: ticks.clone(),
     };
     let world = Arc::new(scene.world);
@@ -113,9 +97,38 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         loops.god_object.tick(|| now);
     }
 
-    let ticks = ticks.lock().unwrap_or_else(PoisonError::into_inner);
+    show_ticks(&ticks.lock().unwrap_or_else(PoisonError::into_inner));
+    show_largest("force (coupling)", &loops.coupling.statistics().force);
+    Ok(())
+}
+
+/// The strings in the scene's simulated hand.
+fn held_strings(
+    strings: &str,
+    scene: &BuiltScene,
+) -> Result<SpidarDevice<HeldStrings>, Box<dyn std::error::Error>> {
+    let hand = scene.hand.as_ref().ok_or("the scene has no hand")?;
+    let via = hand.path.samples().iter().map(|sample| ViaPoint {
+        time_s: sample.time,
+        pose: sample.pose,
+    });
+    let made = simulated_spidar(
+        string_geometry(strings)?,
+        UnitQuaternion::identity(),
+        scene.reference_point(),
+        Hand::FIRM,
+        MinJerkPath::new(via.collect(), hand.repeat)?,
+        None,
+    )?;
+    if let Some(warning) = &made.warning {
+        println!("{warning}");
+    }
+    Ok(made.device)
+}
+
+fn show_ticks(ticks: &[Tick]) {
     let clock = Histogram::default();
-    for _ in &*ticks {
+    for _ in ticks {
         let before = thread_cpu_time();
         clock.record_time(thread_cpu_time().saturating_sub(before));
     }
@@ -124,7 +137,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "reading the clock            p50 {:6.2}  p99 {:6.2}  p99.9 {:6.2} us",
         empty.p50, empty.p99, empty.p999
     );
-    show("pose", &ticks, |_| true, |tick| tick.pose_us);
+    show("pose", ticks, |_| true, |tick| tick.pose_us);
     for status in [
         TensionStatus::Rendered,
         TensionStatus::Scaled,
@@ -132,21 +145,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         TensionStatus::NotFinite,
     ] {
         let of = |tick: &Tick| tick.status == status;
-        show(&format!("tensions, {status:?}"), &ticks, of, |tick| {
+        show(&format!("tensions, {status:?}"), ticks, of, |tick| {
             tick.tensions_us
         });
-        show(&format!("factorisations, {status:?}"), &ticks, of, |tick| {
+        show(&format!("factorisations, {status:?}"), ticks, of, |tick| {
             f64::from(tick.factorisations)
         });
     }
     show(
         "pose and tensions",
-        &ticks,
+        ticks,
         |_| true,
         |tick| tick.pose_us + tick.tensions_us,
     );
-    show_largest("force (coupling)", &loops.coupling.statistics().force);
-    Ok(())
 }
 
 fn show(what: &str, ticks: &[Tick], of: impl Fn(&Tick) -> bool, value: impl Fn(&Tick) -> f64) {

@@ -87,7 +87,8 @@ fn way_since(begun: Instant) -> f64 {
 const STIFFNESS: f64 = 1000.0;
 
 /// Time, s, force, N, and place of the hand, m, of every write to a device.
-type Written = Arc<Mutex<Vec<(f64, Vector3<f64>, Vector3<f64>)>>>;
+type Written = Arc<Mutex<Vec<Write>>>;
+type Write = (f64, Vector3<f64>, Vector3<f64>);
 
 /// A device in a hand that presses down; what is written to it is kept.
 struct Pressed {
@@ -142,6 +143,18 @@ fn press(served: &Served, written: &Written) -> (Arc<AtomicBool>, JoinHandle<()>
     (stop, thread.expect("a thread"))
 }
 
+fn force_has_no_step(written: &[Write]) {
+    for pair in written.windows(2) {
+        let [(t0, f0, x0), (t1, f1, x1)] = pair else {
+            continue;
+        };
+        // 0.5 N/ms, and 1 N at once; beside it what the hand's own motion explains.
+        let most = 1.0 + 500.0 * (t1 - t0) + 1.05 * STIFFNESS * (x1 - x0).norm();
+        let step = (f1 - f0).norm();
+        assert!(step <= most, "{step} N at {t1} s, where {most} N may be");
+    }
+}
+
 #[test]
 fn a_pose_is_changed_under_a_hand_and_the_force_goes_to_zero_and_comes_again_without_a_step() {
     let served = serve(
@@ -191,15 +204,7 @@ fn a_pose_is_changed_under_a_hand_and_the_force_goes_to_zero_and_comes_again_wit
             .iter()
             .any(|(_, force, _)| force.norm() == 0.0)
     );
-    for pair in written.windows(2) {
-        let [(t0, f0, x0), (t1, f1, x1)] = pair else {
-            continue;
-        };
-        // 0.5 N/ms, and 1 N at once; beside it what the hand's own motion explains.
-        let most = 1.0 + 500.0 * (t1 - t0) + 1.05 * STIFFNESS * (x1 - x0).norm();
-        let step = (f1 - f0).norm();
-        assert!(step <= most, "{step} N at {t1} s, where {most} N may be");
-    }
+    force_has_no_step(&written);
     // Who joins now is told of the scene that runs.
     observe(&served, |link| {
         let plate = &link.description().obstacles[0];
