@@ -3,12 +3,26 @@
 use taut_kinds::{Chosen, KINDS, Key, Kind, KindId, Takes, Value};
 use taut_plant::HandPreset;
 
-use super::parts::Files;
+use super::parts::{Files, table};
 use super::spec::Device;
 use crate::document::{Range, Section};
 use crate::scene::pose_of;
 
-pub(super) fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
+/// The device of a workbench that says nothing of it.
+const SIMULATED: Device = Device::Simulated {
+    hand: None,
+    path: None,
+    tremor: 0.0,
+    seed: 0,
+    strings: None,
+};
+
+/// Reads `[device]`.
+pub(super) fn device(root: &Section<'_>, files: &Files<'_>) -> Option<Device> {
+    table(root, "device", |section| device_of(section, files)).unwrap_or(Some(SIMULATED))
+}
+
+fn device_of(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
     if !section.has("kind") {
         section.complain_missing("kind", "kind = \"simulated\"");
     }

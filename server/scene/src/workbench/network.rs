@@ -124,55 +124,61 @@ pub(super) fn places(root: &Section<'_>, network: &Network, nodes: usize, frames
     }
 }
 
-pub(super) fn network(
-    section: Option<Section<'_>>,
-    root: &Section<'_>,
-    files: &Files<'_>,
-) -> Option<Network> {
-    let loopback = IpAddr::V4(Ipv4Addr::LOCALHOST);
-    let Some(section) = section else {
-        return (!root.has("network")).then_some(Network {
-            bind: loopback,
-            quic_port: 4857,
-            udp_port: 4858,
-            transport: TransportKind::Udp,
-            multicast_group: DEFAULT_GROUP,
-            multicast_interface: Ipv4Addr::LOCALHOST,
-            key_file: None,
-            also_key: None,
-            broadcast_rate: 1000.0,
-            max_clients: 16,
-            admission: JoinPolicy::default(),
-            node_timeout: NODE_TIMEOUT,
-        });
-    };
-    let transports = [
-        ("udp", TransportKind::Udp),
-        ("quic", TransportKind::QuicDatagram),
-        ("multicast", TransportKind::Multicast),
-    ];
-    let address = bind(&section, loopback);
-    let (quic_port, udp_port) = (
-        port(&section, "quic_port", 4857),
-        port(&section, "udp_port", 4858),
-    );
+/// The network of a workbench that says nothing of it: within one machine.
+fn plain_network() -> Network {
+    Network {
+        bind: IpAddr::V4(Ipv4Addr::LOCALHOST),
+        quic_port: 4857,
+        udp_port: 4858,
+        transport: TransportKind::Udp,
+        multicast_group: DEFAULT_GROUP,
+        multicast_interface: Ipv4Addr::LOCALHOST,
+        key_file: None,
+        also_key: None,
+        broadcast_rate: 1000.0,
+        max_clients: 16,
+        admission: JoinPolicy::default(),
+        node_timeout: NODE_TIMEOUT,
+    }
+}
+
+/// Ports of QUIC and of UDP, which are not the same.
+fn ports(section: &Section<'_>, plain: &Network) -> (u16, u16) {
+    let quic_port = port(section, "quic_port", plain.quic_port);
+    let udp_port = port(section, "udp_port", plain.udp_port);
     if quic_port == udp_port && quic_port != 0 {
-        let at = section
-            .get("udp_port")
-            .map_or(section.at(), |node| &node.at);
+        let at = section.get("udp_port");
         section.complain(
-            at,
+            at.map_or(section.at(), |node| &node.at),
             format!(
                 "`quic_port` and `udp_port` in {} are both {udp_port}; choose another for one",
                 section.name()
             ),
         );
     }
+    (quic_port, udp_port)
+}
+
+pub(super) fn network(
+    section: Option<Section<'_>>,
+    root: &Section<'_>,
+    files: &Files<'_>,
+) -> Option<Network> {
+    let plain = plain_network();
+    let Some(section) = section else {
+        return (!root.has("network")).then_some(plain);
+    };
+    let transports = [
+        ("udp", TransportKind::Udp),
+        ("quic", TransportKind::QuicDatagram),
+        ("multicast", TransportKind::Multicast),
+    ];
+    let bind = bind(&section, plain.bind).unwrap_or(plain.bind);
+    let (quic_port, udp_port) = ports(&section, &plain);
     let transport = section.choice("transport", &transports).unwrap_or_default();
-    let (multicast_group, multicast_interface) =
-        multicast(&section, transport, address.unwrap_or(loopback));
+    let (multicast_group, multicast_interface) = multicast(&section, transport, bind);
     let network = Network {
-        bind: address.unwrap_or(loopback),
+        bind,
         quic_port,
         udp_port,
         transport,
@@ -183,11 +189,11 @@ pub(super) fn network(
         broadcast_rate: section.number_or(
             "broadcast_rate",
             Range::Between(MIN_STATES, MAX_RATE),
-            1000.0,
+            plain.broadcast_rate,
         ),
         max_clients: section
             .integer("max_clients", 1, MAX_CLIENTS)
-            .map_or(16, |n| n as usize),
+            .map_or(plain.max_clients, |n| n as usize),
         admission: admission(&section),
         node_timeout: section.number_or(
             "node_timeout",

@@ -11,7 +11,16 @@ use crate::scene::pose_of;
 /// Largest limit on what stands out from a screen, degrees: nobody fuses more.
 const MAX_DISPARITY_DEG: f64 = 30.0;
 
-pub(super) fn viewer(section: &Section<'_>, files: &Files<'_>) -> Option<Viewer> {
+/// Reads `[viewer]`, which must be there.
+pub(super) fn viewer(root: &Section<'_>, files: &Files<'_>) -> Option<Viewer> {
+    let viewer = table(root, "viewer", |section| viewer_of(section, files));
+    if viewer.is_none() && !root.has("viewer") {
+        root.complain_missing("viewer", "the table [viewer] with head");
+    }
+    viewer.flatten()
+}
+
+fn viewer_of(section: &Section<'_>, files: &Files<'_>) -> Option<Viewer> {
     let eye_separation = section.number_or("eye_separation", Range::UpTo(0.2), 0.064);
     let head = table(section, "head", pose_of);
     if head.is_none() && !section.has("head") {

@@ -87,8 +87,33 @@ impl WrenchIn {
     }
 }
 
-/// Reads the table.
-pub(super) fn wrench_in(section: &Section<'_>) -> WrenchIn {
+/// What the force from outside is checked against.
+type Beside<'w> = (Option<&'w Device>, &'w Safety, &'w Zenoh);
+
+/// Reads `[wrench_in]`. Without clients that send forces, the network has no role for them.
+pub(super) fn wrench_in(
+    root: &Section<'_>,
+    beside: Beside<'_>,
+    network: Option<&mut Network>,
+) -> WrenchIn {
+    let section = root.section("wrench_in");
+    let wanted = section
+        .as_ref()
+        .map_or_else(WrenchIn::default, wrench_in_of);
+    if let Some(network) = network.filter(|_| !wanted.takes_clients()) {
+        let roles = &mut network.admission.roles;
+        roles.retain(|role| *role != taut_proto::Role::Force);
+    }
+    if let Some(section) = section {
+        if wanted.enabled {
+            complain_beside(&section, &wanted, beside);
+        }
+        section.finish();
+    }
+    wanted
+}
+
+fn wrench_in_of(section: &Section<'_>) -> WrenchIn {
     let default = WrenchIn::default();
     let sources = [("taut", false), ("ros", true)];
     let frames = [
@@ -156,24 +181,8 @@ fn ros_topic(section: &Section<'_>, topic: Option<&str>) -> Option<String> {
     }
 }
 
-/// Complains of what does not go with it, and closes the role of force sources where nobody waits for them.
-pub(super) fn beside(
-    section: Option<&Section<'_>>,
-    wanted: &WrenchIn,
-    (device, safety, zenoh): (Option<&Device>, &Safety, &Zenoh),
-    network: Option<&mut Network>,
-) {
-    if let Some(network) = network
-        && !wanted.takes_clients()
-    {
-        network
-            .admission
-            .roles
-            .retain(|role| *role != taut_proto::Role::Force);
-    }
-    let Some(section) = section.filter(|_| wanted.enabled) else {
-        return;
-    };
+/// Complains of what does not go with it.
+fn complain_beside(section: &Section<'_>, wanted: &WrenchIn, (device, safety, zenoh): Beside<'_>) {
     let complain = |key: &'static str, text: String| {
         let at = section.get(key).map_or(section.at(), |node| &node.at);
         section.complain(at, text);
