@@ -9,7 +9,7 @@ use super::looks::look_of;
 use super::orientation;
 use super::placing::upright;
 use super::repair::note;
-use super::report::{Finding, PartReport, Places};
+use super::report::{Finding, PartReport, Places, SourceReport};
 use super::request::ImportRequest;
 use super::source::Source;
 use super::visual::Visual;
@@ -61,49 +61,19 @@ pub(super) fn body(
     // Where all files agree about up, places are told in their own frame.
     let first_up = sources.first().and_then(|source| source.up);
     let common_up = first_up.filter(|_| sources.iter().all(|source| source.up == first_up));
-    let to_body = |mesh, up: Option<UpAxis>| upright(mesh, up.filter(|_| common_up.is_none()));
-    let mut all = RawMesh::default();
-    let mut begins = Vec::with_capacity(sources.len());
-    for source in &sources {
-        let count = all.vertices.len() + source.mesh.vertices.len();
-        if u32::try_from(count).is_err() {
-            return Err(fail(
-                "have too many vertices together; simplify some of them".into(),
-            ));
-        }
-        begins.push([all.vertices.len(), all.triangles.len()]);
-        all.append(&to_body(source.mesh.clone(), source.up));
-    }
+    let (mut all, begins) = joined(&sources, common_up)
+        .ok_or_else(|| fail("have too many vertices together; simplify some of them".into()))?;
     let mut findings = Vec::new();
     let turned = turn(&mut all, &mut findings);
-    let (mut members, mut reports) = (Vec::new(), Vec::new());
-    for ((source, begin), name) in sources.into_iter().zip(begins).zip(files) {
-        let own = begin[1]..begin[1] + source.mesh.triangles.len();
-        // A face that was turned would be seen from its wrong side in the surface of the file.
-        let is_turned = turned.iter().any(|t| own.contains(&(*t as usize)));
-        let as_read = source.as_read.filter(|_| !is_turned);
-        let triangles = all.triangles[own].iter();
-        let felt = RawMesh {
-            vertices: all.vertices[begin[0]..][..source.mesh.vertices.len()].to_vec(),
-            triangles: triangles.map(|t| t.map(|v| v - begin[0] as u32)).collect(),
-        };
-        members.push(Member {
-            name,
-            look: source.look,
-            as_read: as_read.map(|mesh| upright(mesh, source.up)),
-            felt: upright(felt, common_up),
-        });
-        reports.push(source.report);
-    }
+    let own_parts = sources.into_iter().zip(begins).zip(files);
+    let (members, reports): (Vec<_>, Vec<_>) = own_parts
+        .map(|((source, begin), name)| member(name, source, (&all, begin), &turned, common_up))
+        .unzip();
     let look = look_of(&members, mesh_file);
     drop(members);
     let (mesh, figures) = checked(all).map_err(|faults| {
-        FileError::of_all(
-            faults
-                .into_iter()
-                .map(|text| Problem::of_file(&files_text, text))
-                .collect(),
-        )
+        let of_files = |text| Problem::of_file(&files_text, text);
+        FileError::of_all(faults.into_iter().map(of_files).collect())
     })?;
     let (mesh, simplified) = match request.simplify {
         Some(max_error) => {
@@ -139,6 +109,45 @@ pub(super) fn body(
         mesh: raw,
         visual: look.visual,
     })
+}
+
+/// The sources as one mesh, and at which vertex and triangle each begins; nothing if there are too many.
+fn joined(sources: &[Source], common_up: Option<UpAxis>) -> Option<(RawMesh, Vec<[usize; 2]>)> {
+    let mut all = RawMesh::default();
+    let mut begins = Vec::with_capacity(sources.len());
+    for source in sources {
+        u32::try_from(all.vertices.len() + source.mesh.vertices.len()).ok()?;
+        begins.push([all.vertices.len(), all.triangles.len()]);
+        let up = source.up.filter(|_| common_up.is_none());
+        all.append(&upright(source.mesh.clone(), up));
+    }
+    Some((all, begins))
+}
+
+/// A source as it lies among `all`, where these triangles were turned.
+fn member(
+    name: String,
+    source: Source,
+    (all, [vertex, triangle]): (&RawMesh, [usize; 2]),
+    turned: &[u32],
+    common_up: Option<UpAxis>,
+) -> (Member, SourceReport) {
+    let own = triangle..triangle + source.mesh.triangles.len();
+    // A face that was turned would be seen from its wrong side in the surface of the file.
+    let is_turned = turned.iter().any(|t| own.contains(&(*t as usize)));
+    let as_read = source.as_read.filter(|_| !is_turned);
+    let triangles = all.triangles[own].iter();
+    let felt = RawMesh {
+        vertices: all.vertices[vertex..][..source.mesh.vertices.len()].to_vec(),
+        triangles: triangles.map(|t| t.map(|v| v - vertex as u32)).collect(),
+    };
+    let member = Member {
+        name,
+        look: source.look,
+        as_read: as_read.map(|mesh| upright(mesh, source.up)),
+        felt: upright(felt, common_up),
+    };
+    (member, source.report)
 }
 
 /// Turns closed parts outward; the triangles that were turned.

@@ -13,6 +13,7 @@ mod parse;
 mod parse_look;
 mod parse_mesh_file;
 mod parse_shape;
+mod pieces;
 mod prepared;
 mod settings_tables;
 mod shipped;
