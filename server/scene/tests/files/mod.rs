@@ -9,6 +9,7 @@ mod generated_shapes;
 mod looks;
 mod scene_faults;
 mod scene_page;
+mod scene_values;
 mod seen;
 mod shipped;
 mod simplification;

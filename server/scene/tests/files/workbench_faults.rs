@@ -25,180 +25,192 @@ fn fault(from: &str, to: &str, at: &str) -> String {
         .to_owned()
 }
 
-#[test]
-fn every_fault_names_file_line_and_key() {
-    let node = "name = \"table\"\nscreens";
-    let cases = [
-        (
-            node,
-            "name = \"front\" #\nscreens",
-            "\"front\" #",
-            "there are two nodes of the name \"front\"; rename one",
-        ),
-        (
-            "screens = [\"table\"]",
-            "screens = [\"tabel\"]",
-            "tabel",
-            "[[node]] draws the screen \"tabel\", which does not exist; known screens: front, table",
-        ),
-        (
-            "screens = [\"table\"]",
-            "screens = []",
-            "screens = []",
-            "[[node]] draws no screen; name at least one in `screens`",
-        ),
-        (
-            "quic_port = 4857",
-            "quick_port = 4857",
-            "quick_port",
-            "unknown key `quick_port` in [network]; did you mean `quic_port`?",
-        ),
-        (
-            "udp_port = 4858",
-            "udp_port = 4857",
-            "udp_port",
-            "`quic_port` and `udp_port` in [network] are both 4857; choose another for one",
-        ),
-        (
-            "quic_port = 4857",
-            "quic_port = 70000",
-            "quic_port",
-            "`quic_port` in [network] is 70000, but must be between 0 and 65535",
-        ),
-        (
-            "# multicast_group = \"239.255.72.87:4859\"",
-            "multicast_group = \"192.168.1.5:4859\"",
-            "multicast_group",
-            "`multicast_group` in [network] is \"192.168.1.5:4859\", which is no multicast address with a port; write one such as \"239.255.72.87:4859\"",
-        ),
-        (
-            "# multicast_interface = \"192.168.1.5\"",
-            "multicast_interface = \"eth0\"",
-            "multicast_interface",
-            "[network] does not say from which interface multicast leaves; write its address, such as multicast_interface = \"192.168.1.5\"",
-        ),
-        (
-            "node_timeout = 0.5 ",
-            "node_timeout = 0.05 ",
-            "node_timeout",
-            "`node_timeout` in [network] is 0.05, but must be between 0.1 and 60",
-        ),
-        (
-            "bind = \"127.0.0.1\"",
-            "bind = \"here\"",
-            "\"here\"",
-            "`bind` in [network] is \"here\", which is no address; write one such as \"0.0.0.0\"",
-        ),
-        (
-            "swap = \"scheduled\"",
-            "swap = \"imediate\"",
-            "\"imediate\"",
-            "`swap` in [frames] is \"imediate\", but must be \"immediate\", \"scheduled\" or \"off\"; did you mean `immediate`?",
-        ),
-        (
-            "rate = 60 ",
-            "rate = 0 ",
-            "rate = 0 ",
-            "`rate` in [frames] is 0, but must be between 1 and 1000",
-        ),
-        (
-            "rate = 60 ",
-            "rat = 60 ",
-            "rat = 60 ",
-            "unknown key `rat` in [frames]; did you mean `rate`?",
-        ),
-        (
-            "mode = \"waive\"",
-            "mode = \"wave\"",
-            "\"wave\"",
-            "`mode` in [realtime] is \"wave\", but must be \"enforce\" or \"waive\"; did you mean `waive`?",
-        ),
-        (
-            "haptics_priority = 80",
-            "haptics_priority = 100",
-            "haptics_priority",
-            "`haptics_priority` in [realtime] is 100, but must be between 1 and 99",
-        ),
-        (
-            "eye_separation = 0.064",
-            "eye_separation = 64",
-            "eye_separation",
-            "`eye_separation` in [viewer] is 64, but must be between 0 and 0.2",
-        ),
-        (
-            "eye_separation = 0.064",
-            "separation_scale = 2.0",
-            "separation_scale = 2.0",
-            "`separation_scale` in [viewer] is 2, but must be between 0 and 1",
-        ),
-        (
-            "height = 427, fullscreen = false }",
-            "height = 427, monitor = [0, true] }",
-            "monitor = [0, true]",
-            "`monitor` in [[node]] window is a truth value, but must be a name in quotes, a number from 0, or an array of these",
-        ),
-        (
-            "near = 0.05",
-            "near = 50.0",
-            "[viewer]",
-            "`near` (50) in [viewer] must be smaller than `far` (20)",
-        ),
-        (
-            "kind = \"simulated\"",
-            "kind = \"trace\"",
-            "[device]",
-            "`path` is missing in [device]; add path = \"trace.csv\"",
-        ),
-        (
-            "stereo = \"side-by-side\"",
-            "stereo = \"sidebyside\"",
-            "sidebyside",
-            "`stereo` in [[node]] is \"sidebyside\", but must be",
-        ),
-        (
-            "force_slew = 0.5 ",
-            "force_slew = -0.5 ",
-            "force_slew",
-            "`force_slew` in [safety] is -0.5, but must be greater than zero and at most 100",
-        ),
-        (
-            "# max_force = 20.0 ",
-            "max_force = 60.0 #",
-            "max_force = 60",
-            "`max_force` in [safety] is 60 N, which cannot fade in 95 ms at `force_slew` = 0.5 N/ms; use at most 47.5 N, or a larger `force_slew`",
-        ),
-        (
-            "# rearm = \"manual\" ",
-            "rearm = \"never\" #",
-            "\"never\"",
-            "`rearm` in [safety] is \"never\", but must be \"automatic\" or \"manual\"",
-        ),
-        (
-            "# dead_man = 0 ",
-            "dead_man = 16 #",
-            "dead_man = 16",
-            "`dead_man` in [safety] is 16, but must be between 0 and 15",
-        ),
-        (
-            "torque_slew = 0.05",
-            "torque_slow = 0.05",
-            "torque_slow",
-            "unknown key `torque_slow` in [safety]; did you mean `torque_slew`?",
-        ),
-        (
-            "passivity = \"observe\"",
-            "passivity = \"obey\"",
-            "\"obey\"",
-            "`passivity` in [safety] is \"obey\", but must be \"observe\" or \"control\"",
-        ),
-        (
+/// One change of the shipped file, from and to; what the line of its fault has; how that begins.
+type Case = ([&'static str; 2], &'static str, &'static str);
+
+const SCREENS_AND_NODES: &[Case] = &[
+    (
+        [
             "upper_left = [-0.9, 0.0, 1.2]",
             "upper_left = [0.9, 0.0, 1.2]",
-            "[[screen]]",
-            "the corners of screen \"front\" are no rectangle",
-        ),
+        ],
+        "[[screen]]",
+        "the corners of screen \"front\" are no rectangle",
+    ),
+    (
+        ["name = \"table\"\nscreens", "name = \"front\" #\nscreens"],
+        "\"front\" #",
+        "there are two nodes of the name \"front\"; rename one",
+    ),
+    (
+        ["screens = [\"table\"]", "screens = [\"tabel\"]"],
+        "tabel",
+        "[[node]] draws the screen \"tabel\", which does not exist; known screens: front, table",
+    ),
+    (
+        ["screens = [\"table\"]", "screens = []"],
+        "screens = []",
+        "[[node]] draws no screen; name at least one in `screens`",
+    ),
+    (
+        ["stereo = \"side-by-side\"", "stereo = \"sidebyside\""],
+        "sidebyside",
+        "`stereo` in [[node]] is \"sidebyside\", but must be",
+    ),
+    (
+        [
+            "height = 427, fullscreen = false }",
+            "height = 427, monitor = [0, true] }",
+        ],
+        "monitor = [0, true]",
+        "`monitor` in [[node]] window is a truth value, but must be a name in quotes, a number from 0, or an array of these",
+    ),
+];
+
+const NETWORK: &[Case] = &[
+    (
+        ["quic_port = 4857", "quick_port = 4857"],
+        "quick_port",
+        "unknown key `quick_port` in [network]; did you mean `quic_port`?",
+    ),
+    (
+        ["udp_port = 4858", "udp_port = 4857"],
+        "udp_port",
+        "`quic_port` and `udp_port` in [network] are both 4857; choose another for one",
+    ),
+    (
+        ["quic_port = 4857", "quic_port = 70000"],
+        "quic_port",
+        "`quic_port` in [network] is 70000, but must be between 0 and 65535",
+    ),
+    (
+        [
+            "# multicast_group = \"239.255.72.87:4859\"",
+            "multicast_group = \"192.168.1.5:4859\"",
+        ],
+        "multicast_group",
+        "`multicast_group` in [network] is \"192.168.1.5:4859\", which is no multicast address with a port; write one such as \"239.255.72.87:4859\"",
+    ),
+    (
+        [
+            "# multicast_interface = \"192.168.1.5\"",
+            "multicast_interface = \"eth0\"",
+        ],
+        "multicast_interface",
+        "[network] does not say from which interface multicast leaves; write its address, such as multicast_interface = \"192.168.1.5\"",
+    ),
+    (
+        ["node_timeout = 0.5 ", "node_timeout = 0.05 "],
+        "node_timeout",
+        "`node_timeout` in [network] is 0.05, but must be between 0.1 and 60",
+    ),
+    (
+        ["bind = \"127.0.0.1\"", "bind = \"here\""],
+        "\"here\"",
+        "`bind` in [network] is \"here\", which is no address; write one such as \"0.0.0.0\"",
+    ),
+];
+
+const FRAMES: &[Case] = &[
+    (
+        ["swap = \"scheduled\"", "swap = \"imediate\""],
+        "\"imediate\"",
+        "`swap` in [frames] is \"imediate\", but must be \"immediate\", \"scheduled\" or \"off\"; did you mean `immediate`?",
+    ),
+    (
+        ["rate = 60 ", "rate = 0 "],
+        "rate = 0 ",
+        "`rate` in [frames] is 0, but must be between 1 and 1000",
+    ),
+    (
+        ["rate = 60 ", "rat = 60 "],
+        "rat = 60 ",
+        "unknown key `rat` in [frames]; did you mean `rate`?",
+    ),
+];
+
+const REALTIME: &[Case] = &[
+    (
+        ["mode = \"waive\"", "mode = \"wave\""],
+        "\"wave\"",
+        "`mode` in [realtime] is \"wave\", but must be \"enforce\" or \"waive\"; did you mean `waive`?",
+    ),
+    (
+        ["haptics_priority = 80", "haptics_priority = 100"],
+        "haptics_priority",
+        "`haptics_priority` in [realtime] is 100, but must be between 1 and 99",
+    ),
+];
+
+const VIEWER: &[Case] = &[
+    (
+        ["eye_separation = 0.064", "eye_separation = 64"],
+        "eye_separation",
+        "`eye_separation` in [viewer] is 64, but must be between 0 and 0.2",
+    ),
+    (
+        ["eye_separation = 0.064", "separation_scale = 2.0"],
+        "separation_scale = 2.0",
+        "`separation_scale` in [viewer] is 2, but must be between 0 and 1",
+    ),
+    (
+        ["near = 0.05", "near = 50.0"],
+        "[viewer]",
+        "`near` (50) in [viewer] must be smaller than `far` (20)",
+    ),
+];
+
+const DEVICE: &[Case] = &[(
+    ["kind = \"simulated\"", "kind = \"trace\""],
+    "[device]",
+    "`path` is missing in [device]; add path = \"trace.csv\"",
+)];
+
+const SAFETY: &[Case] = &[
+    (
+        ["force_slew = 0.5 ", "force_slew = -0.5 "],
+        "force_slew",
+        "`force_slew` in [safety] is -0.5, but must be greater than zero and at most 100",
+    ),
+    (
+        ["# max_force = 20.0 ", "max_force = 60.0 #"],
+        "max_force = 60",
+        "`max_force` in [safety] is 60 N, which cannot fade in 95 ms at `force_slew` = 0.5 N/ms; use at most 47.5 N, or a larger `force_slew`",
+    ),
+    (
+        ["# rearm = \"manual\" ", "rearm = \"never\" #"],
+        "\"never\"",
+        "`rearm` in [safety] is \"never\", but must be \"automatic\" or \"manual\"",
+    ),
+    (
+        ["# dead_man = 0 ", "dead_man = 16 #"],
+        "dead_man = 16",
+        "`dead_man` in [safety] is 16, but must be between 0 and 15",
+    ),
+    (
+        ["torque_slew = 0.05", "torque_slow = 0.05"],
+        "torque_slow",
+        "unknown key `torque_slow` in [safety]; did you mean `torque_slew`?",
+    ),
+    (
+        ["passivity = \"observe\"", "passivity = \"obey\""],
+        "\"obey\"",
+        "`passivity` in [safety] is \"obey\", but must be \"observe\" or \"control\"",
+    ),
+];
+
+#[test]
+fn every_fault_names_file_line_and_key() {
+    let tables = [
+        SCREENS_AND_NODES,
+        NETWORK,
+        FRAMES,
+        REALTIME,
+        VIEWER,
+        DEVICE,
+        SAFETY,
     ];
-    for (from, to, at, expected) in cases {
+    for ([from, to], at, expected) in tables.concat() {
         let found = fault(from, to, at);
         assert!(
             found.starts_with(expected),
