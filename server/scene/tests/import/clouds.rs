@@ -112,14 +112,10 @@ pub(super) fn on_ball(p: [f64; 3], radius: f64) -> Point {
     p.map(|c| radius * c / length)
 }
 
-/// Clouds, a thickness for each, and how many closed parts the shell has, where that is known.
-fn clouds() -> Vec<(&'static str, Vec<Point>, f64, Option<usize>)> {
-    let grid = |z: f64| -> Vec<Point> {
-        let cells = (0..12).flat_map(|i| (0..9).map(move |j| [i, j]));
-        cells
-            .map(|[i, j]| [f64::from(i) * 1e-3, f64::from(j) * 1e-3, z])
-            .collect()
-    };
+/// What it is, its points, a thickness, and how many closed parts the shell has, where that is known.
+type Cloud = (&'static str, Vec<Point>, f64, Option<usize>);
+
+fn points_and_lines() -> Vec<Cloud> {
     let line = |way: Point| -> Vec<Point> {
         (0..40)
             .map(|k| way.map(|c| c * f64::from(k) * 1e-3))
@@ -141,6 +137,17 @@ fn clouds() -> Vec<(&'static str, Vec<Point>, f64, Option<usize>)> {
             5e-3,
             Some(1),
         ),
+    ]
+}
+
+fn planes() -> Vec<Cloud> {
+    let grid = |z: f64| -> Vec<Point> {
+        let cells = (0..12).flat_map(|i| (0..9).map(move |j| [i, j]));
+        cells
+            .map(|[i, j]| [f64::from(i) * 1e-3, f64::from(j) * 1e-3, z])
+            .collect()
+    };
+    vec![
         ("a plane", grid(0.0), 3e-3, Some(1)),
         (
             "a plane twice",
@@ -173,6 +180,11 @@ fn clouds() -> Vec<(&'static str, Vec<Point>, f64, Option<usize>)> {
             Some(108),
         ),
         ("points whose balls touch", grid(0.0), 1e-3, None),
+    ]
+}
+
+fn scattered() -> Vec<Cloud> {
+    vec![
         (
             "a ball's surface",
             random(2000, |p| on_ball(p, 0.02)),
@@ -203,7 +215,8 @@ fn clouds() -> Vec<(&'static str, Vec<Point>, f64, Option<usize>)> {
 
 #[test]
 fn a_shell_is_closed_and_as_far_from_the_points_as_is_said() {
-    for (what, cloud, thickness, parts) in clouds() {
+    let clouds = [points_and_lines(), planes(), scattered()];
+    for (what, cloud, thickness, parts) in clouds.into_iter().flatten() {
         let (report, verdict) =
             import_as("a.ply", &ply_points(&cloud), Some(thickness), Some("m")).unwrap();
         let first = report.parts[0].all_findings().next().unwrap();

@@ -4,20 +4,14 @@ use super::{Case, ONE, bad, good};
 use crate::import::solids::{Soup, Triangle, VOLUME, cuboid, flipped, joined, moved, part};
 use crate::import::write::{ply, stl};
 
-pub(super) fn directions() -> Vec<Case> {
-    let inner = || cuboid([0.01, 0.008, 0.005]);
-    const INNER: f64 = 8.0 * 0.01 * 0.008 * 0.005;
+pub(super) fn turned() -> Vec<Case> {
     let beside = || moved(part(), [0.1, 0.0, 0.0]);
-    let mixed = || {
-        let mut k = 0;
-        let turn = |t: Triangle| {
-            k += 1;
-            if k % 3 == 0 { [t[0], t[2], t[1]] } else { t }
-        };
-        part().into_iter().map(turn).collect::<Soup>()
+    let mut k = 0;
+    let every_third = |t: Triangle| {
+        k += 1;
+        if k % 3 == 0 { [t[0], t[2], t[1]] } else { t }
     };
-    let core = || moved(cuboid([0.002; 3]), [0.002, 0.0, 0.0]);
-    const CORE: f64 = 8.0 * 8e-9;
+    let mixed: Soup = part().into_iter().map(every_third).collect();
     vec![
         good(
             "inside-out.stl",
@@ -41,7 +35,7 @@ pub(super) fn directions() -> Vec<Case> {
         good(
             "mixed.stl",
             "every third triangle turned",
-            stl(&mixed()),
+            stl(&mixed),
             part(),
             &["triangles-turned"],
             ONE,
@@ -54,6 +48,15 @@ pub(super) fn directions() -> Vec<Case> {
             &["parts-turned"],
             (2, 2.0 * VOLUME),
         ),
+    ]
+}
+
+pub(super) fn cavities() -> Vec<Case> {
+    const INNER: f64 = 8.0 * 0.01 * 0.008 * 0.005;
+    const CORE: f64 = 8.0 * 8e-9;
+    let inner = || cuboid([0.01, 0.008, 0.005]);
+    let core = || moved(cuboid([0.002; 3]), [0.002, 0.0, 0.0]);
+    vec![
         good(
             "cavity.ply",
             "a closed cavity",
@@ -86,13 +89,16 @@ pub(super) fn directions() -> Vec<Case> {
             &["parts-turned", "cavities"],
             (3, VOLUME - INNER + CORE),
         ),
-        bad(
-            "moebius.ply",
-            "a surface with one side only",
-            ply(&moebius()),
-            "one side only",
-        ),
     ]
+}
+
+pub(super) fn one_sided() -> Vec<Case> {
+    vec![bad(
+        "moebius.ply",
+        "a surface with one side only",
+        ply(&moebius()),
+        "one side only",
+    )]
 }
 
 fn moebius() -> Soup {

@@ -4,7 +4,7 @@ use super::{Case, MM, ONE, bad, good};
 use crate::import::solids::{VOLUME, moved, part, scaled};
 use crate::import::write::{glb, obj_soup, ply, stl, stl_text};
 
-pub(super) fn formats_and_units() -> Vec<Case> {
+pub(super) fn formats() -> Vec<Case> {
     vec![
         good("clean.ply", "nothing", ply(&part()), part(), &[], ONE),
         good(
@@ -31,6 +31,11 @@ pub(super) fn formats_and_units() -> Vec<Case> {
             &[],
             ONE,
         ),
+    ]
+}
+
+pub(super) fn units() -> Vec<Case> {
+    vec![
         good(
             "mm.stl",
             "millimetres",
@@ -77,6 +82,11 @@ pub(super) fn formats_and_units() -> Vec<Case> {
             "must have one between",
         )
         .options("--unit m"),
+    ]
+}
+
+pub(super) fn far_places() -> Vec<Case> {
+    vec![
         good(
             "far.ply",
             "a kilometre from the origin, double precision",

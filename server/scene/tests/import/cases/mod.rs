@@ -87,11 +87,18 @@ impl Case {
 
 pub(crate) fn cases() -> Vec<Case> {
     [
-        files::formats_and_units(),
+        files::formats(),
+        files::units(),
+        files::far_places(),
         surfaces::shared_vertices(),
-        surfaces::faces(),
-        directions::directions(),
-        openings::openings(),
+        surfaces::thin_triangles(),
+        surfaces::copies(),
+        surfaces::whole_surfaces(),
+        directions::turned(),
+        directions::cavities(),
+        directions::one_sided(),
+        openings::holes(),
+        openings::sheets(),
         openings::contacts(),
         clouds::clouds(),
         files::broken(),

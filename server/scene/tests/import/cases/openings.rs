@@ -9,48 +9,25 @@ use crate::import::solids::{
 };
 use crate::import::write::{obj_soup, ply, stl};
 
-pub(super) fn openings() -> Vec<Case> {
-    let holed = |count: usize| {
-        let whole = ball(0.03);
+pub(super) fn holes() -> Vec<Case> {
+    let whole = ball(0.03);
+    // Far apart in the order of the file, and so in space.
+    let without_some = |count: usize| {
         let mut soup = whole.clone();
-        // Far apart in the order of the file, and so in space.
         (0..count).for_each(|k| {
             soup.remove(40 + 90 * k);
         });
-        (soup, whole)
+        soup
     };
     let volume = |soup: &Soup| soup.iter().map(six_volumes).sum::<f64>() / 6.0;
-    let ((one, whole), (three, _)) = (holed(1), holed(3));
     let cup = || without(part(), |p| p[2] == HALF[2]);
-    let flat = || sheet([0.06, 0.04], [6, 4]);
-    // A cell of 4 mm is gone near each corner: four edges and less than a percent of the area each.
-    let plate = || {
-        let in_cell = |c: f64, middle: f64| (c - middle).abs() < 0.0021;
-        without(sheet([0.06, 0.04], [15, 10]), |[x, y, _]| {
-            [0.006, 0.054].iter().any(|middle| in_cell(*x, *middle))
-                && [0.006, 0.034].iter().any(|middle| in_cell(*y, *middle))
-        })
-    };
-    let bent = || {
-        mapped(flat(), |[x, y, _]| {
-            if x > 0.03 {
-                [0.03, y, x - 0.03]
-            } else {
-                [x, y, 0.0]
-            }
-        })
-    };
-    let tee = || {
-        let stem = mapped(sheet([0.03, 0.04], [3, 4]), |[x, y, _]| [0.03, y, x]);
-        joined([flat(), stem])
-    };
     let tin = || soup_of(&taut_scene::shapes::cylinder(0.02, 0.01, 24, Axis::Z));
     let opened = || without(tin(), |p| p[2] == 0.01);
     vec![
         good(
             "hole.ply",
             "a triangle is missing",
-            ply(&one),
+            ply(&without_some(1)),
             whole.clone(),
             &["holes-closed"],
             (1, volume(&whole)),
@@ -58,7 +35,7 @@ pub(super) fn openings() -> Vec<Case> {
         good(
             "holes.ply",
             "three triangles are missing",
-            ply(&three),
+            ply(&without_some(3)),
             whole.clone(),
             &["holes-closed"],
             (1, volume(&whole)),
@@ -97,6 +74,14 @@ pub(super) fn openings() -> Vec<Case> {
             (1, volume(&tin())),
         )
         .options("--close-holes 24"),
+    ]
+}
+
+pub(super) fn sheets() -> Vec<Case> {
+    let thickened = |file, what, soup: Soup, volume| {
+        good(file, what, stl(&soup), soup, &["thickened"], (1, volume)).options("--thicken 0.001")
+    };
+    vec![
         bad(
             "sheet.stl",
             "an open sheet",
@@ -110,33 +95,19 @@ pub(super) fn openings() -> Vec<Case> {
             "closed there it would hold nothing",
         )
         .options("--close-holes 64"),
-        good(
+        thickened(
             "sheet-thick.stl",
             "an open sheet, to be 1 mm thick",
-            stl(&flat()),
             flat(),
-            &["thickened"],
-            (1, 2.4e-6),
-        )
-        .options("--thicken 0.001"),
-        good(
+            2.4e-6,
+        ),
+        thickened(
             "plate-thick.stl",
             "an open sheet with four holes for bolts, to be 1 mm thick",
-            stl(&plate()),
             plate(),
-            &["thickened"],
-            (1, 2.336e-6),
-        )
-        .options("--thicken 0.001"),
-        good(
-            "bent.stl",
-            "a bent sheet, to be 1 mm thick",
-            stl(&bent()),
-            bent(),
-            &["thickened"],
-            (1, 2.4e-6),
-        )
-        .options("--thicken 0.001"),
+            2.336e-6,
+        ),
+        thickened("bent.stl", "a bent sheet, to be 1 mm thick", bent(), 2.4e-6),
         good(
             "tee.stl",
             "two sheets that make a T, to be 1 mm thick",
@@ -156,6 +127,34 @@ pub(super) fn openings() -> Vec<Case> {
         )
         .options("--thicken 0.001"),
     ]
+}
+
+fn flat() -> Soup {
+    sheet([0.06, 0.04], [6, 4])
+}
+
+/// A cell of 4 mm is gone near each corner: four edges and less than a percent of the area each.
+fn plate() -> Soup {
+    let in_cell = |c: f64, middle: f64| (c - middle).abs() < 0.0021;
+    without(sheet([0.06, 0.04], [15, 10]), |[x, y, _]| {
+        [0.006, 0.054].iter().any(|middle| in_cell(*x, *middle))
+            && [0.006, 0.034].iter().any(|middle| in_cell(*y, *middle))
+    })
+}
+
+fn bent() -> Soup {
+    mapped(flat(), |[x, y, _]| {
+        if x > 0.03 {
+            [0.03, y, x - 0.03]
+        } else {
+            [x, y, 0.0]
+        }
+    })
+}
+
+fn tee() -> Soup {
+    let stem = mapped(sheet([0.03, 0.04], [3, 4]), |[x, y, _]| [0.03, y, x]);
+    joined([flat(), stem])
 }
 
 pub(super) fn contacts() -> Vec<Case> {

@@ -88,9 +88,8 @@ fn with_flat_triangle() -> Soup {
     soup
 }
 
-pub(super) fn faces() -> Vec<Case> {
-    let first = part()[0];
-    let [a, b, _] = first;
+pub(super) fn thin_triangles() -> Vec<Case> {
+    let [a, b, _] = part()[0];
     vec![
         good(
             "no-area.ply",
@@ -116,6 +115,12 @@ pub(super) fn faces() -> Vec<Case> {
             &[],
             ONE,
         ),
+    ]
+}
+
+pub(super) fn copies() -> Vec<Case> {
+    let first = part()[0];
+    vec![
         good(
             "copy.ply",
             "a triangle twice",
@@ -148,6 +153,12 @@ pub(super) fn faces() -> Vec<Case> {
             &["vertices-equal", "copies"],
             ONE,
         ),
+    ]
+}
+
+pub(super) fn whole_surfaces() -> Vec<Case> {
+    let [a, b, _] = part()[0];
+    vec![
         bad(
             "only-lines.ply",
             "nothing but triangles without area",
