@@ -45,13 +45,22 @@ macro_rules! measures {
             /// All, in the order of the files.
             pub const ALL: &[Self] = &[$(Self::$name,)*];
 
-            /// Name in tables and files.
-            pub fn key(self) -> &'static str { match self { $(Self::$name => $key,)* } }
-
-            /// Its unit.
-            pub fn unit(self) -> &'static str { match self { $(Self::$name => $unit,)* } }
+            /// Key and unit of each.
+            const TABLE: &[(&str, &str)] = &[$(($key, $unit),)*];
         }
     };
+}
+
+impl Measure {
+    /// Name in tables and files.
+    pub fn key(self) -> &'static str {
+        Self::TABLE[self as usize].0
+    }
+
+    /// Its unit.
+    pub fn unit(self) -> &'static str {
+        Self::TABLE[self as usize].1
+    }
 }
 
 measures! {

@@ -7,6 +7,7 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use crate::chart::colour;
@@ -82,6 +83,8 @@ fn missed(score: &Score, lines: &[&str]) -> usize {
     score.cases.values().filter(misses).count()
 }
 
+type Drawn = Result<(), Box<dyn Error>>;
+
 fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
     let columns = columns(scores);
     let of_rate = |rate: u32| scores.iter().filter(move |score| score.rate == rate);
@@ -96,67 +99,93 @@ fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
     let root =
         SVGBackend::with_string(&mut text, (width as u32, height as u32)).into_drawing_area();
     root.fill(&WHITE)?;
-    let write = |text: &str, (x, y), size: i32| {
-        root.draw(&Text::new(text.to_owned(), (x, y), ("sans-serif", size)))
+    let cases = scores.iter().map(|score| score.cases.len()).max();
+    let picture = Picture {
+        root,
+        columns,
+        cases: cases.unwrap_or(0),
     };
-    let cases = scores
-        .iter()
-        .map(|score| score.cases.len())
-        .max()
-        .unwrap_or(0);
-    write(
-        &format!("Why cases are outside the budget: lines missed, in how many of {cases} cases"),
-        (16, 8),
-        19,
-    )?;
-    write(
-        "docs/laboratory.md says what each line is; a case may miss several",
-        (16, 34),
-        14,
-    )?;
-    let column = |index: usize| NAMES + index as i32 * CELL.0;
-    write("cases within", (column(0) + 4, 62), 13)?;
-    write("the budget", (column(0) + 4, 76), 13)?;
-    for (index, (name, _)) in columns.iter().enumerate() {
-        for (word, part) in words(name).into_iter().enumerate() {
-            let place = (column(index + 1) + 4, 62 + 14 * word as i32);
-            root.draw(&Text::new(part.to_owned(), place, ("sans-serif", 13)))?;
-        }
-    }
+    picture.head()?;
     let mut y = HEAD;
     for rate in rates {
-        write(&format!("{rate} Hz"), (16, y - 18), 15)?;
+        picture.write(&format!("{rate} Hz"), (16, y - 18), 15)?;
         for score in of_rate(rate) {
-            write(score.method.name(), (28, y + 4), 14)?;
-            let all = score.cases.len().max(1);
-            let within = score.within() as f64 / all as f64;
-            let counts = columns.iter().map(|(_, lines)| missed(score, lines));
-            let cells = std::iter::once((
-                score.within(),
-                colour(score.method).mix(0.15 + 0.5 * within),
-            ))
-            .chain(counts.map(|count| (count, RED.mix(0.7 * count as f64 / all as f64))));
-            for (index, (count, fill)) in cells.enumerate() {
-                let (left, top) = (column(index), y);
-                let cell = [(left, top), (left + CELL.0 - 3, top + CELL.1 - 3)];
-                root.draw(&Rectangle::new(cell, fill.filled()))?;
-                let said = match index {
-                    0 if score.cases.len() < cases => {
-                        format!("{count} of {}", score.cases.len())
-                    }
-                    _ => count.to_string(),
-                };
-                if count > 0 || index == 0 {
-                    write(&said, (left + 20, top + 3), 14)?;
-                }
-            }
+            picture.row(y, score)?;
             y += CELL.1;
         }
         y += GAP;
     }
-    root.present()?;
-    drop(root);
+    picture.root.present()?;
+    drop(picture);
     Ok(text)
+}
+
+/// Where a column begins; the first is that of the cases within the budget.
+fn left(column: usize) -> i32 {
+    NAMES + column as i32 * CELL.0
+}
+
+struct Picture<'a> {
+    root: DrawingArea<SVGBackend<'a>, Shift>,
+    columns: Vec<Column>,
+    /// The most that a method has.
+    cases: usize,
+}
+
+impl Picture<'_> {
+    fn write(&self, text: &str, at: (i32, i32), size: i32) -> Drawn {
+        let style = ("sans-serif", size);
+        Ok(self.root.draw(&Text::new(text.to_owned(), at, style))?)
+    }
+
+    fn head(&self) -> Drawn {
+        let cases = self.cases;
+        self.write(
+            &format!(
+                "Why cases are outside the budget: lines missed, in how many of {cases} cases"
+            ),
+            (16, 8),
+            19,
+        )?;
+        self.write(
+            "docs/laboratory.md says what each line is; a case may miss several",
+            (16, 34),
+            14,
+        )?;
+        self.write("cases within", (left(0) + 4, 62), 13)?;
+        self.write("the budget", (left(0) + 4, 76), 13)?;
+        for (index, (name, _)) in self.columns.iter().enumerate() {
+            for (word, part) in words(name).into_iter().enumerate() {
+                self.write(part, (left(index + 1) + 4, 62 + 14 * word as i32), 13)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn row(&self, y: i32, score: &Score) -> Drawn {
+        self.write(score.method.name(), (28, y + 4), 14)?;
+        let all = score.cases.len().max(1);
+        let within = score.within() as f64 / all as f64;
+        let shade = colour(score.method).mix(0.15 + 0.5 * within);
+        let counts = self.columns.iter().map(|(_, lines)| missed(score, lines));
+        let cells = std::iter::once((score.within(), shade))
+            .chain(counts.map(|count| (count, RED.mix(0.7 * count as f64 / all as f64))));
+        for (index, (count, fill)) in cells.enumerate() {
+            let x = left(index);
+            let cell = [(x, y), (x + CELL.0 - 3, y + CELL.1 - 3)];
+            self.root.draw(&Rectangle::new(cell, fill.filled()))?;
+            let said = match index {
+                0 if score.cases.len() < self.cases => {
+                    format!("{count} of {}", score.cases.len())
+                }
+                _ => count.to_string(),
+            };
+            if count > 0 || index == 0 {
+                self.write(&said, (x + 20, y + 3), 14)?;
+            }
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]

@@ -98,54 +98,10 @@ impl Plan {
         let recipes = all(self.extent);
         let wanted: Vec<&Recipe> = recipes.iter().filter(|r| self.wants(r.name)).collect();
         let studies: Vec<&Study> = STUDIES.iter().filter(|s| self.wants(s.name)).collect();
-        let runs = |recipe: &&&Recipe| players(recipe, &self.methods).len();
-        let steps = studies.len()
-            + wanted.iter().map(|recipe| runs(&recipe)).sum::<usize>()
-            + self
-                .sweeps
-                .iter()
-                .map(|sweep| sweep.count(self.extent))
-                .sum::<usize>()
-            + if self.maps {
-                maps::tasks(self.extent).len()
-            } else {
-                0
-            };
-        let bar = bar(steps);
-        // References first: whoever needs one while another makes it would wait.
-        let has_reference = |recipe: &&&Recipe| matches!(recipe.ideal, Ideal::Reference);
-        let references: Vec<&Recipe> = wanted.iter().filter(has_reference).copied().collect();
-        crew::map(self.threads, &references, |recipe| {
-            bar.set_message(format!("{recipe:?}: reference"));
-            let _ = recipe.answer();
-        });
-
-        let by_recipe = wanted.iter().flat_map(|recipe| {
-            let players = players(recipe, &self.methods).into_iter();
-            players.map(|(method, rate)| Task::Run(recipe, method, rate))
-        });
-        let tasks: Vec<Task<'_>> = studies
-            .iter()
-            .map(|study| Task::Study(study))
-            .chain(by_recipe)
-            .collect();
-        let done = crew::map(self.threads, &tasks, |task| {
-            let done = match task {
-                Task::Study(study) => {
-                    bar.set_message(format!("{}: {}", study.name, study.about));
-                    Done::Rows((study.run)(self.extent))
-                }
-                Task::Run(recipe, method, rate) => {
-                    bar.set_message(format!("{recipe:?}"));
-                    Done::Outcome(Box::new(Outcome::kept(store, recipe, *method, *rate)))
-                }
-            };
-            bar.inc(1);
-            done
-        });
-
+        let bar = bar(self.steps(&wanted, &studies));
+        self.make_references(&wanted, &bar);
         let mut results = Results::default();
-        for done in done {
+        for done in self.done(&wanted, &studies, store, &bar) {
             match done {
                 Done::Rows(rows) => results.rows.extend(rows),
                 Done::Outcome(outcome) => results.outcomes.push(*outcome),
@@ -157,7 +113,7 @@ impl Plan {
         results.port = figures::port_errors(&wanted);
         let mut rest = results.outcomes.as_slice();
         for recipe in wanted {
-            let (its, others) = rest.split_at(runs(&&recipe));
+            let (its, others) = rest.split_at(self.runs_of(recipe));
             rest = others;
             results.rows.extend(recipe_rows(recipe, &self.methods, its));
             results.about.push((recipe.name, recipe.about));
@@ -175,6 +131,61 @@ impl Plan {
         }
         bar.finish_and_clear();
         results
+    }
+
+    fn runs_of(&self, recipe: &Recipe) -> usize {
+        players(recipe, &self.methods).len()
+    }
+
+    /// What the bar counts.
+    fn steps(&self, wanted: &[&Recipe], studies: &[&Study]) -> usize {
+        let runs = wanted.iter().map(|recipe| self.runs_of(recipe));
+        let points = self.sweeps.iter().map(|sweep| sweep.count(self.extent));
+        let maps = self.maps.then(|| maps::tasks(self.extent).len());
+        studies.len() + runs.sum::<usize>() + points.sum::<usize>() + maps.unwrap_or(0)
+    }
+
+    /// Before all else: whoever needs a reference while another makes it would wait.
+    fn make_references(&self, wanted: &[&Recipe], bar: &ProgressBar) {
+        let has_reference = |recipe: &&&Recipe| matches!(recipe.ideal, Ideal::Reference);
+        let references: Vec<&Recipe> = wanted.iter().filter(has_reference).copied().collect();
+        crew::map(self.threads, &references, |recipe| {
+            bar.set_message(format!("{recipe:?}: reference"));
+            let _ = recipe.answer();
+        });
+    }
+
+    /// Studies, then every recipe with each of its players.
+    fn done(
+        &self,
+        wanted: &[&Recipe],
+        studies: &[&Study],
+        store: &Store,
+        bar: &ProgressBar,
+    ) -> Vec<Done> {
+        let by_recipe = wanted.iter().flat_map(|recipe| {
+            let players = players(recipe, &self.methods).into_iter();
+            players.map(|(method, rate)| Task::Run(recipe, method, rate))
+        });
+        let tasks: Vec<Task<'_>> = studies
+            .iter()
+            .map(|study| Task::Study(study))
+            .chain(by_recipe)
+            .collect();
+        crew::map(self.threads, &tasks, |task| {
+            let done = match task {
+                Task::Study(study) => {
+                    bar.set_message(format!("{}: {}", study.name, study.about));
+                    Done::Rows((study.run)(self.extent))
+                }
+                Task::Run(recipe, method, rate) => {
+                    bar.set_message(format!("{recipe:?}"));
+                    Done::Outcome(Box::new(Outcome::kept(store, recipe, *method, *rate)))
+                }
+            };
+            bar.inc(1);
+            done
+        })
     }
 }
 

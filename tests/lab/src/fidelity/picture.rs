@@ -2,6 +2,7 @@
 
 use std::error::Error;
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::sweep::{BUDGET, Swept};
@@ -26,6 +27,8 @@ fn ends(swept: &[Swept]) -> [f64; 2] {
     [least, most.max(least + 1.0)]
 }
 
+type Drawn = Result<(), Box<dyn Error>>;
+
 /// The picture as a text; a row for each scene.
 pub fn svg(swept: &[Swept]) -> Result<String, Box<dyn Error>> {
     let height = HEAD + FOOT + LINE * swept.len() as i32;
@@ -33,59 +36,79 @@ pub fn svg(swept: &[Swept]) -> Result<String, Box<dyn Error>> {
     let root =
         SVGBackend::with_string(&mut text, (WIDTH as u32, height as u32)).into_drawing_area();
     root.fill(&WHITE)?;
-    let write = |text: &str, at: (i32, i32), size: i32, ink: RGBColor| {
-        root.draw(&Text::new(
-            text.to_owned(),
-            at,
-            ("sans-serif", size).into_font().color(&ink),
-        ))
+    let picture = Picture {
+        root,
+        ends: ends(swept),
     };
-    let [least, most] = ends(swept);
-    let place = |cost: f64| {
+    picture.head()?;
+    picture.axis(height - FOOT)?;
+    for (index, s) in swept.iter().enumerate() {
+        picture.row(HEAD + LINE * index as i32 + LINE / 2, s)?;
+    }
+    picture.root.present()?;
+    drop(picture);
+    Ok(text)
+}
+
+struct Picture<'a> {
+    root: DrawingArea<SVGBackend<'a>, Shift>,
+    ends: [f64; 2],
+}
+
+impl Picture<'_> {
+    fn write(&self, text: &str, at: (i32, i32), size: i32, ink: RGBColor) -> Drawn {
+        let style = ("sans-serif", size).into_font().color(&ink);
+        Ok(self.root.draw(&Text::new(text.to_owned(), at, style))?)
+    }
+
+    fn place(&self, cost: f64) -> i32 {
+        let [least, most] = self.ends;
         let share = (cost.log10() - least) / (most - least);
         NAMES + (share * f64::from(WIDTH - NAMES - RATIOS)) as i32
-    };
-    write(
-        &format!("What a scene needs: cost of every setting, error within J = {BUDGET} or not"),
-        (16, 8),
-        19,
-        BLACK,
-    )?;
-    for (x, ink, said) in [
-        (16, OVER, "over the budget"),
-        (156, WITHIN, "within it"),
-        (256, BLACK, "the cheapest within it"),
-        (436, CHOSEN, "what the scene chose by itself"),
-    ] {
-        root.draw(&Circle::new((x + 6, 48), 5, ink.filled()))?;
-        write(said, (x + 16, 40), 14, BLACK)?;
     }
-    write(
-        "chosen over cheapest",
-        (WIDTH - RATIOS - 10, HEAD - 26),
-        13,
-        BLACK,
-    )?;
-    for decade in least as i32..=most as i32 {
-        let x = place(10_f64.powi(decade));
-        let line = vec![(x, HEAD - 8), (x, height - FOOT + 4)];
-        root.draw(&PathElement::new(line, GREY.stroke_width(1)))?;
-        write(
-            &format!("{:.0}", 10_f64.powi(decade)),
-            (x - 12, height - FOOT + 8),
-            13,
+
+    fn head(&self) -> Drawn {
+        self.write(
+            &format!("What a scene needs: cost of every setting, error within J = {BUDGET} or not"),
+            (16, 8),
+            19,
             BLACK,
         )?;
+        for (x, ink, said) in [
+            (16, OVER, "over the budget"),
+            (156, WITHIN, "within it"),
+            (256, BLACK, "the cheapest within it"),
+            (436, CHOSEN, "what the scene chose by itself"),
+        ] {
+            let dot = Circle::new((x + 6, 48), 5, ink.filled());
+            self.root.draw(&dot)?;
+            self.write(said, (x + 16, 40), 14, BLACK)?;
+        }
+        let at = (WIDTH - RATIOS - 10, HEAD - 26);
+        self.write("chosen over cheapest", at, 13, BLACK)
     }
-    write(
-        "cost, nominal microseconds of the god-object loop a second",
-        (NAMES, height - 20),
-        14,
-        BLACK,
-    )?;
-    for (index, s) in swept.iter().enumerate() {
-        let y = HEAD + LINE * index as i32 + LINE / 2;
-        write(s.name, (16, y - 8), 14, BLACK)?;
+
+    /// `foot`: where the rows end.
+    fn axis(&self, foot: i32) -> Drawn {
+        let [least, most] = self.ends;
+        for decade in least as i32..=most as i32 {
+            let cost = 10_f64.powi(decade);
+            let x = self.place(cost);
+            let line = vec![(x, HEAD - 8), (x, foot + 4)];
+            let line = PathElement::new(line, GREY.stroke_width(1));
+            self.root.draw(&line)?;
+            self.write(&format!("{cost:.0}"), (x - 12, foot + 8), 13, BLACK)?;
+        }
+        self.write(
+            "cost, nominal microseconds of the god-object loop a second",
+            (NAMES, foot + FOOT - 20),
+            14,
+            BLACK,
+        )
+    }
+
+    fn row(&self, y: i32, s: &Swept) -> Drawn {
+        self.write(s.name, (16, y - 8), 14, BLACK)?;
         // Those within lie above the line, the others below it.
         for setting in &s.all {
             let (up, ink) = if setting.j <= BUDGET {
@@ -93,23 +116,22 @@ pub fn svg(swept: &[Swept]) -> Result<String, Box<dyn Error>> {
             } else {
                 (6, OVER)
             };
-            let dot = Circle::new((place(setting.cost), y + up), 3, ink.filled());
-            root.draw(&dot)?;
+            let dot = Circle::new((self.place(setting.cost), y + up), 3, ink.filled());
+            self.root.draw(&dot)?;
         }
         if let Some(best) = s.cheapest() {
-            root.draw(&Circle::new((place(best.cost), y - 6), 5, BLACK.filled()))?;
+            let dot = Circle::new((self.place(best.cost), y - 6), 5, BLACK.filled());
+            self.root.draw(&dot)?;
         }
         let up = if s.is_within() { -6 } else { 6 };
-        let ring = Circle::new((place(s.auto.cost), y + up), 8, CHOSEN.stroke_width(2));
-        root.draw(&ring)?;
+        let at = (self.place(s.auto.cost), y + up);
+        let ring = Circle::new(at, 8, CHOSEN.stroke_width(2));
+        self.root.draw(&ring)?;
         let said = match (s.is_within(), s.ratio()) {
             (true, Some(ratio)) => format!("{ratio:.2}"),
             (false, Some(_)) => "over the budget".to_owned(),
             (_, None) => "none is within".to_owned(),
         };
-        write(&said, (WIDTH - RATIOS + 10, y - 8), 14, BLACK)?;
+        self.write(&said, (WIDTH - RATIOS + 10, y - 8), 14, BLACK)
     }
-    root.present()?;
-    drop(root);
-    Ok(text)
 }

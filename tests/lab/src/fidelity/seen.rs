@@ -67,17 +67,15 @@ pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
     fs::write(directory.join("lift.csv"), lift)?;
     let ball = |radius: f64| format!("sphere = {{ radius = {radius:?} }}");
     let mut scenes = round(&ball);
+    scenes.extend(curved(&ball));
     scenes.extend(edged(&ball));
     scenes.extend(turning());
     with_hands(scenes, directory)
 }
 
-/// Round on round, convex and hollow.
+/// Round something of one radius.
 fn round(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
     let shape = |shape: String| format!("shape = {{ {shape} }}");
-    let valley = "shape = { sphere = { radius = 0.03 } }\npose = { position = [-0.02, 0.0, 0.0] }\n\
-        [[obstacle]]\nname = \"b\"\nshape = { sphere = { radius = 0.03 } }\npose = { position = [0.02, 0.0, 0.0] }";
-    let bottom = (0.042_f64.powi(2) - 0.02_f64.powi(2)).sqrt();
     vec![
         scene(
             "small on small",
@@ -112,6 +110,15 @@ fn round(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
             0.6,
             around(0.04, 2e-3, 0.12),
         ),
+    ]
+}
+
+/// Over what is curved more here than there, and in what is hollow.
+fn curved(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
+    let valley = "shape = { sphere = { radius = 0.03 } }\npose = { position = [-0.02, 0.0, 0.0] }\n\
+        [[obstacle]]\nname = \"b\"\nshape = { sphere = { radius = 0.03 } }\npose = { position = [0.02, 0.0, 0.0] }";
+    let bottom = (0.042_f64.powi(2) - 0.02_f64.powi(2)).sqrt();
+    vec![
         scene(
             "ball over an egg",
             text(

@@ -147,6 +147,14 @@ pub(super) fn ours_alone(method: Method, reason: &'static str) -> Option<&'stati
     (!ours).then_some(reason)
 }
 
+/// Why a method has no part in a recipe that shades its force.
+pub(super) fn does_not_shade(method: Method) -> Option<&'static str> {
+    match method {
+        Method::Paper | Method::PaperAdapted => None,
+        _ => ours_alone(method, "it has no force shading"),
+    }
+}
+
 /// The largest of a number of the ticks from `begin` on, s.
 pub(super) fn largest_from(
     begin: f64,

@@ -100,13 +100,28 @@ fn comb(extent: Extent, clearance: f64) -> Recipe {
     }
 }
 
+/// How fast the device turns the gear, rad/s, and how far to either side, rad.
+const RATE: f64 = 0.05;
+const MOST: f64 = 0.012;
+/// Time in which it gets there, and for which it waits, s.
+const THERE: f64 = MOST / RATE;
+const HELD: f64 = 0.1;
+
+/// The angle of a gear that is turned to one side and then to the other, rad.
+fn turned(time: f64) -> f64 {
+    let time = time.min(3.0 * THERE + HELD);
+    if time < THERE {
+        RATE * time
+    } else {
+        (MOST - RATE * (time - THERE - HELD).max(0.0)).max(-MOST)
+    }
+}
+
 /// Module 2 mm, 20 teeth against 40 that stand, each flank of the turning one set back by 0.1 mm along the pitch circle.
 ///
 /// Involutes stay parallel under rotation: the free play is 0.1 mm / 20 mm = 0.005 rad each way. Then the contact is a force along the line of
 /// action, which touches the base circle r_b: turning on by d gives lambda = r_b d / (1/m + r_b^2 / I), torque k_h k_s r_b lambda.
 fn gear(extent: Extent) -> Recipe {
-    const RATE: f64 = 0.05; // rad/s
-    const MOST: f64 = 0.012; // rad
     let turning = Gear {
         module: 2e-3,
         teeth: 20,
@@ -132,19 +147,10 @@ fn gear(extent: Extent) -> Recipe {
         body: held,
         obstacles: vec![obstacle("gear", mesh(standing.mesh()), place)],
     };
-    let there = MOST / RATE;
-    let angle = move |time: f64| {
-        let time = time.min(3.0 * there + 0.1);
-        if time < there {
-            RATE * time
-        } else {
-            (MOST - RATE * (time - there - 0.1).max(0.0)).max(-MOST)
-        }
-    };
-    let device = move |time: f64| {
+    let device = |time: f64| {
         Pose::from_parts(
             Translation3::identity(),
-            UnitQuaternion::from_scaled_axis(Vector3::z() * angle(time)),
+            UnitQuaternion::from_scaled_axis(Vector3::z() * turned(time)),
         )
     };
     let scene = Scene::new(world, SIZE, RATE * 0.022, device(0.0));
@@ -152,10 +158,10 @@ fn gear(extent: Extent) -> Recipe {
     let rest = scene.settings.rest_distance;
     let play = turning.set_back / turning.pitch_radius();
     let torque = move |time: f64| {
-        let beyond = (angle(time).abs() - play).max(0.0);
-        -angle(time).signum() * gain * base * base * beyond / (1.0 + base * base / inertia)
+        let beyond = (turned(time).abs() - play).max(0.0);
+        -turned(time).signum() * gain * base * base * beyond / (1.0 + base * base / inertia)
     };
-    let most = torque(there).abs();
+    let most = torque(THERE).abs();
     let case = ("R25", "gear in gear".to_owned());
     let about = "gears: free through their backlash, then stiff";
     Recipe {
@@ -182,6 +188,6 @@ fn gear(extent: Extent) -> Recipe {
             largest_from(0.0, |tick| linear(&tick.wrench).z.abs()),
         )],
         out_of_scope: turns,
-        ..Recipe::new(case, about, scene, 3.0 * there + 0.2, device)
+        ..Recipe::new(case, about, scene, 3.0 * THERE + 2.0 * HELD, device)
     }
 }

@@ -1,15 +1,15 @@
 //! R08: a small ball is moved over a convex edge by a device inside the solid. The force turns where the ideal one does, and no later.
 
 use god_object::spatial::linear;
-use god_object::{ForceShading, Pose, World};
+use god_object::{ForceShading, Obstacle, Pose, Vector6, World};
 use nalgebra::Vector3;
 use taut_method_tests::solids::obstacle;
 
 use super::Extent;
-use super::bodies::{Path, ball, drawn_out, force, ghost_time, ours_alone, sound};
+use super::bodies::{Path, ball, does_not_shade, drawn_out, force, ghost_time, sound};
 use crate::clock::{TICK, Tick};
 use crate::measure::{JND_MAGNITUDE, Measure};
-use crate::method::{Method, Scene};
+use crate::method::Scene;
 use crate::recipe::{Ideal, Line, Probe, Recipe};
 
 const TIP: f64 = 1e-3;
@@ -33,8 +33,8 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     recipes
 }
 
-/// `degrees`: by how much the surface turns at the edge, which is the y axis; the top is z = 0 for x < 0.
-fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
+/// The edge is the y axis, at which the surface turns by `degrees`; the top is z = 0 for x < 0.
+fn solid(degrees: f64, shaded: bool) -> Obstacle {
     let (sine, cosine) = degrees.to_radians().sin_cos();
     let mut outline = vec![
         [-LENGTH, 0.0],
@@ -46,9 +46,40 @@ fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
     }
     let mut solid = obstacle("solid", drawn_out(&outline, 0.05), Pose::identity());
     solid.surface.shading = shaded.then_some(ForceShading { crease_angle: 1.0 });
+    solid
+}
+
+/// The right answer for a device at a place.
+fn ideal(degrees: f64, stiffness: f64, place: Vector3<f64>) -> Vector6 {
+    if place.x < 0.0 {
+        return force(0.0, 0.0, stiffness * (TIP - place.z).max(0.0));
+    }
+    // Past the edge only the slope holds it, or the edge itself, or nothing.
+    let (sine, cosine) = degrees.to_radians().sin_cos();
+    let out = Vector3::new(sine, 0.0, cosine);
+    let along = Vector3::new(cosine, 0.0, -sine);
+    let push = if along.dot(&place) >= 0.0 {
+        out * (TIP - out.dot(&place)).max(0.0)
+    } else {
+        let apart = place.norm();
+        place * ((TIP - apart).max(0.0) / apart)
+    } * stiffness;
+    force(push.x, push.y, push.z)
+}
+
+/// By how much a force that is felt turns in a millisecond, at its most, degrees.
+fn largest_turn(ticks: &[Tick]) -> f64 {
+    let felt = |tick: &Tick| Some(linear(&tick.wrench)).filter(|f| f.norm() > FELT);
+    let turns = ticks
+        .windows(2)
+        .filter_map(|pair| Some(felt(&pair[0])?.angle(&felt(&pair[1])?).to_degrees()));
+    turns.fold(0.0, f64::max)
+}
+
+fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
     let world = World {
         body: ball(TIP),
-        obstacles: vec![solid],
+        obstacles: vec![solid(degrees, shaded)],
     };
     let at = |x: f64, z: f64| Vector3::new(x, 0.0, TIP + z);
     let path = Path::from(at(-0.03, 1e-3))
@@ -58,18 +89,11 @@ fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
         .hold(0.05);
     let scene = Scene::new(world, 2.0 * TIP, SPEED, path.pose(0.0));
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
-    let ideal = path.clone();
+    let led = path.clone();
     let surface = if shaded { ", shaded" } else { "" };
     let case = ("R08", format!("edge of {degrees} degrees{surface}"));
     let about = "convex edge: the force turns where the ideal one does";
     let duration = path.duration();
-    let turn = |ticks: &[Tick]| {
-        let felt = |tick: &Tick| Some(linear(&tick.wrench)).filter(|f| f.norm() > FELT);
-        let turns = ticks
-            .windows(2)
-            .filter_map(|pair| Some(felt(&pair[0])?.angle(&felt(&pair[1])?).to_degrees()));
-        turns.fold(0.0, f64::max)
-    };
     let right = stiffness * DEPTH;
     // The device is at its depth, and the ball has come to rest.
     let (from, to) = (0.08 + 0.05, 0.08 + 0.1);
@@ -84,22 +108,7 @@ fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
         ideal: if shaded {
             Ideal::None
         } else {
-            Ideal::closed(move |time| {
-                let place = ideal.at(time);
-                if place.x < 0.0 {
-                    return force(0.0, 0.0, stiffness * (TIP - place.z).max(0.0));
-                }
-                // Past the edge only the slope holds it, or the edge itself, or nothing.
-                let out = Vector3::new(sine, 0.0, cosine);
-                let along = Vector3::new(cosine, 0.0, -sine);
-                let push = if along.dot(&place) >= 0.0 {
-                    out * (TIP - out.dot(&place)).max(0.0)
-                } else {
-                    let apart = place.norm();
-                    place * ((TIP - apart).max(0.0) / apart)
-                } * stiffness;
-                force(push.x, push.y, push.z)
-            })
+            Ideal::closed(move |time| ideal(degrees, stiffness, led.at(time)))
         },
         phases: extent.choose(20, 2),
         lines: Box::new(move |rate| {
@@ -111,17 +120,10 @@ fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
             lines
         }),
         probes: vec![
-            Probe::at_most("turn_of_force", "deg/ms", limit, turn),
+            Probe::at_most("turn_of_force", "deg/ms", limit, largest_turn),
             Probe::at_most("force_before_edge", "%", 100.0 * JND_MAGNITUDE, before),
         ],
-        out_of_scope: if shaded {
-            |method| match method {
-                Method::Paper | Method::PaperAdapted => None,
-                _ => ours_alone(method, "it has no force shading"),
-            }
-        } else {
-            |_| None
-        },
+        out_of_scope: if shaded { does_not_shade } else { |_| None },
         ..Recipe::new(case, about, scene, duration, move |time| path.pose(time))
     }
 }

@@ -4,13 +4,11 @@
 //! what is felt, half of 18.4 degrees.
 
 use god_object::{Pose, Primitive, World};
-use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
-use taut_method_tests::solids::{mesh, obstacle};
-use taut_scene::shapes::{Axis, cylinder};
+use nalgebra::Point3;
 
 use super::Extent;
 use super::bodies::{ball, force, smooth, sound};
-use super::prism::Prism;
+use super::prism::{Prism, out};
 use crate::measure::{JND_DIRECTION, Measure};
 use crate::method::Scene;
 use crate::recipe::{Ideal, Line, Recipe};
@@ -44,22 +42,7 @@ fn recipe(radius: f64, speed: f64, sides: Option<usize>) -> Recipe {
         radius: solid,
         tip: TIP,
     };
-    // The ball comes down on the middle of a side: on a corner it could go either way.
-    let half_side = Vector3::y() * (0.5 * prism.side());
-    let turned = Pose::from_parts(
-        Translation3::identity(),
-        UnitQuaternion::from_scaled_axis(half_side),
-    );
-    let mut round = obstacle(
-        "cylinder",
-        mesh(cylinder(
-            solid,
-            HALF_LENGTH,
-            sides.unwrap_or(FACETS),
-            Axis::Y,
-        )),
-        turned,
-    );
+    let mut round = prism.obstacle(HALF_LENGTH);
     round.primitive = sides.is_none().then(|| Primitive::Cylinder {
         ends: [-HALF_LENGTH, HALF_LENGTH].map(|y| Point3::new(0.0, y, 0.0)),
         radius: solid,
@@ -72,7 +55,6 @@ fn recipe(radius: f64, speed: f64, sides: Option<usize>) -> Recipe {
     };
     let arrived = (APPROACH + DEPTH) / APPROACH_SPEED;
     let begin = arrived + WAIT;
-    let out = |angle: f64| Vector3::new(angle.sin(), 0.0, angle.cos());
     // Depth, and angle from the z axis towards the x axis.
     let place = move |time: f64| {
         let depth = (time * APPROACH_SPEED).min(APPROACH + DEPTH) - APPROACH;

@@ -5,6 +5,16 @@
 
 use std::f64::consts::PI;
 
+use god_object::{Obstacle, Pose};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use taut_method_tests::solids::{mesh, obstacle};
+use taut_scene::shapes::{Axis, cylinder};
+
+/// The direction from the axis y at an angle from z towards x, rad.
+pub(super) fn out(angle: f64) -> Vector3<f64> {
+    Vector3::new(angle.sin(), 0.0, angle.cos())
+}
+
 /// A prism about an axis, the middle of one side at angle 0, and a ball on it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prism {
@@ -24,6 +34,18 @@ impl Prism {
     /// How far a side is from the axis, m.
     pub(super) fn apothem(&self) -> f64 {
         self.radius * (0.5 * self.side()).cos()
+    }
+
+    /// An obstacle about y, of half this length, m.
+    pub(super) fn obstacle(&self, half: f64) -> Obstacle {
+        // A ball comes down on the middle of a side: on a corner it could go either way.
+        let half_side = Vector3::y() * (0.5 * self.side());
+        let turned = Pose::from_parts(
+            Translation3::identity(),
+            UnitQuaternion::from_scaled_axis(half_side),
+        );
+        let round = cylinder(self.radius, half, self.sides, Axis::Y);
+        obstacle("cylinder", mesh(round), turned)
     }
 
     /// How deep a device at this angle, rad, and distance from the axis, m, is behind the side that the ball is on, and the angle of that side.

@@ -62,32 +62,29 @@ fn primitive(primitive: &Primitive, factor: f64) -> Primitive {
     }
 }
 
-fn scaled(recipe: Recipe, factor: f64) -> Recipe {
-    let given = &recipe.scene;
-    let body = &given.world.body;
-    let world = World {
-        body: Body {
-            mesh: mesh(&body.mesh, factor),
-            primitive: body.primitive.as_ref().map(|p| primitive(p, factor)),
-            mass: body.mass / factor,
-            inertia: body.inertia * factor,
-            reference_point: point(&body.reference_point, factor),
-        },
-        obstacles: given
-            .world
-            .obstacles
-            .iter()
-            .map(|o| Obstacle {
-                name: o.name.clone(),
-                mesh: mesh(&o.mesh, factor),
-                primitive: o.primitive.as_ref().map(|p| primitive(p, factor)),
-                pose: pose(&o.pose, factor),
-                surface: o.surface.clone(),
-            })
-            .collect(),
-    };
+fn body(body: &Body, factor: f64) -> Body {
+    Body {
+        mesh: mesh(&body.mesh, factor),
+        primitive: body.primitive.as_ref().map(|p| primitive(p, factor)),
+        mass: body.mass / factor,
+        inertia: body.inertia * factor,
+        reference_point: point(&body.reference_point, factor),
+    }
+}
+
+fn obstacle(obstacle: &Obstacle, factor: f64) -> Obstacle {
+    Obstacle {
+        name: obstacle.name.clone(),
+        mesh: mesh(&obstacle.mesh, factor),
+        primitive: obstacle.primitive.as_ref().map(|p| primitive(p, factor)),
+        pose: pose(&obstacle.pose, factor),
+        surface: obstacle.surface.clone(),
+    }
+}
+
+fn scene(scene: &Scene, factor: f64) -> Scene {
     // Everything in the settings that is a length derives from the body's.
-    let mut settings = given.settings;
+    let mut settings = scene.settings;
     for length in [
         &mut settings.rest_distance,
         &mut settings.minimum_gap,
@@ -102,12 +99,23 @@ fn scaled(recipe: Recipe, factor: f64) -> Recipe {
         adaptation.threshold *= factor;
     }
     settings.torque_limit *= factor;
-    let scene = Scene {
-        world: Arc::new(world),
-        start: pose(&given.start, factor),
+    let World {
+        body: held,
+        obstacles,
+    } = &*scene.world;
+    Scene {
+        world: Arc::new(World {
+            body: body(held, factor),
+            obstacles: obstacles.iter().map(|o| obstacle(o, factor)).collect(),
+        }),
+        start: pose(&scene.start, factor),
         settings,
-        speed: given.speed * factor,
-    };
+        speed: scene.speed * factor,
+    }
+}
+
+fn scaled(recipe: Recipe, factor: f64) -> Recipe {
+    let scene = scene(&recipe.scene, factor);
     let Recipe {
         name,
         case,

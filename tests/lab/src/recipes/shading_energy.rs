@@ -4,22 +4,24 @@ use std::f64::consts::TAU;
 
 use god_object::spatial::linear;
 use god_object::{ForceShading, Pose, World};
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
-use taut_method_tests::solids::{mesh, obstacle};
-use taut_scene::shapes::{Axis, cylinder};
 
 use super::Extent;
-use super::bodies::{ball, force, ours_alone, sound};
-use super::prism::Prism;
+use super::bodies::{ball, does_not_shade, force, sound};
+use super::prism::{Prism, out};
 use crate::clock::Tick;
 use crate::measure::{JND_MAGNITUDE, Measure};
-use crate::method::{Method, Scene};
-use crate::recipe::{Ideal, OURS, Probe, Recipe, open_for};
+use crate::method::Scene;
+use crate::recipe::{Ideal, OURS, Open, Probe, Recipe, open_for};
 
 const RADIUS: f64 = 0.02;
 const TIP: f64 = 2e-3;
 const DEPTH: f64 = 3e-3;
 const SIDES: usize = 32;
+const PRISM: Prism = Prism {
+    sides: SIDES,
+    radius: RADIUS,
+    tip: TIP,
+};
 /// m/s.
 const SPEED: f64 = 0.2;
 /// Way in, s, and time to come to rest before the first turn, s.
@@ -32,37 +34,35 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     vec![recipe(extent, false), recipe(extent, true)]
 }
 
-fn recipe(extent: Extent, shaded: bool) -> Recipe {
-    let prism = Prism {
-        sides: SIDES,
-        radius: RADIUS,
-        tip: TIP,
-    };
-    // The ball comes down on the middle of a side.
-    let half_side = Vector3::y() * (0.5 * prism.side());
-    let turned = Pose::from_parts(
-        Translation3::identity(),
-        UnitQuaternion::from_scaled_axis(half_side),
-    );
-    let mut round = obstacle(
-        "cylinder",
-        mesh(cylinder(RADIUS, 0.05, SIDES, Axis::Y)),
-        turned,
-    );
-    round.surface.shading = shaded.then_some(ForceShading { crease_angle: 1.0 });
-    let world = World {
-        body: ball(TIP),
-        obstacles: vec![round],
-    };
-    let turns = extent.choose(10, 1);
-    let deep = RADIUS + TIP - DEPTH;
-    let (begin, period) = (APPROACH + WAIT, TAU * deep / SPEED);
-    let out = |angle: f64| Vector3::new(angle.sin(), 0.0, angle.cos());
-    // Depth, angle, and the largest angle so far.
-    let place = move |time: f64| {
+/// Down, so many turns round, and as many back.
+#[derive(Clone, Copy)]
+struct Turns {
+    count: u32,
+    /// When the first begins, and how long each takes, s.
+    begin: f64,
+    period: f64,
+}
+
+impl Turns {
+    fn new(count: u32) -> Self {
+        let deep = RADIUS + TIP - DEPTH;
+        Self {
+            count,
+            begin: APPROACH + WAIT,
+            period: TAU * deep / SPEED,
+        }
+    }
+
+    /// s.
+    fn duration(self) -> f64 {
+        self.begin + 2.0 * f64::from(self.count) * self.period
+    }
+
+    /// Depth, angle, and the largest angle so far.
+    fn place(self, time: f64) -> (f64, f64, f64) {
         let depth = -1e-3 + (DEPTH + 1e-3) * (time / APPROACH).min(1.0);
-        let gone = ((time - begin) / period).max(0.0);
-        let whole = f64::from(turns);
+        let gone = ((time - self.begin) / self.period).max(0.0);
+        let whole = f64::from(self.count);
         // There, and back again.
         let angle = TAU
             * if gone < whole {
@@ -71,18 +71,19 @@ fn recipe(extent: Extent, shaded: bool) -> Recipe {
                 2.0 * whole - gone
             };
         (depth, angle, if gone < whole { angle } else { TAU * whole })
-    };
-    let device = move |time: f64| {
-        let (depth, angle, _) = place(time);
+    }
+
+    fn device(self, time: f64) -> Pose {
+        let (depth, angle, _) = self.place(time);
         let at = out(angle) * (RADIUS + TIP - depth);
         Pose::translation(at.x, at.y, at.z)
-    };
-    let scene = Scene::new(world, 2.0 * TIP, SPEED, device(0.0));
-    let stiffness = scene.stiffness();
-    let most = move |ticks: &[Tick]| {
-        let mut of_turn = vec![0.0; 2 * turns as usize];
+    }
+
+    /// The most that the hand gets out of a turn, J.
+    fn most_work(self, ticks: &[Tick]) -> f64 {
+        let mut of_turn = vec![0.0; 2 * self.count as usize];
         for pair in ticks.windows(2) {
-            let turn = (pair[0].time - begin) / period;
+            let turn = (pair[0].time - self.begin) / self.period;
             if let Some(work) = (turn >= 0.0)
                 .then(|| of_turn.get_mut(turn as usize))
                 .flatten()
@@ -92,26 +93,42 @@ fn recipe(extent: Extent, shaded: bool) -> Recipe {
             }
         }
         of_turn.into_iter().fold(f64::NEG_INFINITY, f64::max)
-    };
-    // What gives no force gives no energy, and is no answer: its size is that of the depth, on the average of a side.
-    let mean = move |ticks: &[Tick]| {
-        let turning = ticks.iter().filter(|tick| tick.time >= begin);
+    }
+
+    /// How far the mean size of the force is off that of the depth, %.
+    fn error_of_mean(self, stiffness: f64, ticks: &[Tick]) -> f64 {
+        // What gives no force gives no energy, and is no answer: its size is that of the depth, on the average of a side.
+        let turning = ticks.iter().filter(|tick| tick.time >= self.begin);
         let sizes: Vec<f64> = turning.map(|tick| linear(&tick.wrench).norm()).collect();
         let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
         100.0 * (mean / (stiffness * DEPTH) - 1.0).abs()
+    }
+}
+
+fn recipe(extent: Extent, shaded: bool) -> Recipe {
+    let mut round = PRISM.obstacle(0.05);
+    round.surface.shading = shaded.then_some(ForceShading { crease_angle: 1.0 });
+    let world = World {
+        body: ball(TIP),
+        obstacles: vec![round],
     };
+    let turns = Turns::new(extent.choose(10, 1));
+    let device = move |time: f64| turns.device(time);
+    let scene = Scene::new(world, 2.0 * TIP, SPEED, device(0.0));
+    let stiffness = scene.stiffness();
+    let most = move |ticks: &[Tick]| turns.most_work(ticks);
+    let mean = move |ticks: &[Tick]| turns.error_of_mean(stiffness, ticks);
     let surface = if shaded { "shaded" } else { "plain" };
     let case = ("R31", format!("cylinder of {SIDES} sides, {surface}"));
     let about = "energy of a closed path: nothing to be got out of it";
-    let duration = begin + 2.0 * f64::from(turns) * period;
     Recipe {
         // How a shaded normal turns is the shading's own choice: there is no right answer to compare with, but for the size of the force.
         ideal: if shaded {
             Ideal::None
         } else {
             Ideal::closed(move |time| {
-                let (depth, angle, most) = place(time);
-                let (deep, normal) = prism.depth(angle, most, RADIUS + TIP - depth);
+                let (depth, angle, most) = turns.place(time);
+                let (deep, normal) = PRISM.depth(angle, most, RADIUS + TIP - depth);
                 let push = out(normal) * (stiffness * deep);
                 force(push.x, push.y, push.z)
             })
@@ -121,23 +138,16 @@ fn recipe(extent: Extent, shaded: bool) -> Recipe {
             Probe::at_most("work_of_a_turn", "J", ROUNDING, most),
             Probe::at_most("mean_force", "%", 100.0 * JND_MAGNITUDE, mean),
         ],
-        open: if shaded {
-            Vec::new()
-        } else {
-            let reason = "the force turns by 11 degrees at a corner, an update after the right answer does; there is a corner in 19 ms";
-            let mut open = open_for(OURS, &[70, 300], Measure::JndP95.key(), reason);
-            open.extend(open_for(OURS, &[70], Measure::JndShare.key(), reason));
-            open
-        },
-        out_of_scope: if shaded {
-            |method| match method {
-                Method::Paper | Method::PaperAdapted => None,
-                _ => ours_alone(method, "it has no force shading"),
-            }
-        } else {
-            |_| None
-        },
+        open: if shaded { Vec::new() } else { open() },
+        out_of_scope: if shaded { does_not_shade } else { |_| None },
         check_every: 10,
-        ..Recipe::new(case, about, scene, duration, device)
+        ..Recipe::new(case, about, scene, turns.duration(), device)
     }
+}
+
+fn open() -> Vec<Open> {
+    let reason = "the force turns by 11 degrees at a corner, an update after the right answer does; there is a corner in 19 ms";
+    let mut open = open_for(OURS, &[70, 300], Measure::JndP95.key(), reason);
+    open.extend(open_for(OURS, &[70], Measure::JndShare.key(), reason));
+    open
 }
