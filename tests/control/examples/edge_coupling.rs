@@ -11,6 +11,7 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use taut_control_tests::edge::{Mode, Outcome, run};
 use taut_control_tests::edge_network::Impairment;
@@ -147,89 +148,94 @@ fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
     let panels = root.split_evenly((1, 4));
     let tasks = ["wall", "corner", "dome", "peg"];
     for (k, (panel, task)) in panels.iter().zip(tasks).enumerate() {
-        let mut chart = ChartBuilder::on(panel)
-            .caption(task, ("sans-serif", 18))
-            .margin(10)
-            .x_label_area_size(38)
-            .y_label_area_size(if k == 0 { 62 } else { 48 })
-            .build_cartesian_2d(0.0..(DELAYS_MS.len() - 1) as f64, SHOWN.log_scale())?;
-        chart
-            .configure_mesh()
-            .x_desc("one-way delay, ms")
-            .y_desc(if k == 0 {
-                "largest in the run, JND"
-            } else {
-                ""
-            })
-            .x_labels(DELAYS_MS.len())
-            .x_label_formatter(&|place| {
-                let delay = DELAYS_MS.get(place.round() as usize);
-                delay.map_or(String::new(), |delay| format!("{delay:.0}"))
-            })
-            .y_label_formatter(&|jnd| format!("{jnd}"))
-            .light_line_style(WHITE)
-            .label_style(("sans-serif", 13))
-            .draw()?;
-        let end = (DELAYS_MS.len() - 1) as f64;
-        chart
-            .draw_series(LineSeries::new(
-                [(0.0, 1.0), (end, 1.0)],
-                BLACK.stroke_width(1),
-            ))?
-            .label("one just-noticeable difference")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], BLACK.stroke_width(1)));
-        for mode in [Mode::Edge, Mode::Shipped] {
-            for loss in SHOWN_LOSSES {
-                let colour = match (mode, loss > 0.0) {
-                    (Mode::Edge, false) => RGBColor(0x1f, 0x77, 0xb4),
-                    (Mode::Edge, true) => RGBColor(0x17, 0xa0, 0xb0),
-                    (Mode::Shipped, false) => RGBColor(0xd6, 0x27, 0x28),
-                    (Mode::Shipped, true) => RGBColor(0xff, 0x9a, 0x2e),
-                };
-                let points: Vec<(f64, f64, bool)> = DELAYS_MS
-                    .iter()
-                    .enumerate()
-                    .filter_map(|(place, delay)| {
-                        let row = rows.iter().find(|row| {
-                            row.task == task
-                                && row.mode == mode
-                                && row.loss_percent == loss
-                                && row.delay_ms == *delay
-                        })?;
-                        let error = row.outcome.error.max.clamp(SHOWN.start, SHOWN.end);
-                        Some((place as f64, error, row.outcome.stable))
-                    })
-                    .collect();
-                let line = points.iter().map(|(x, y, _)| (*x, *y));
-                let what = match mode {
-                    Mode::Edge => "coupling at the edge",
-                    Mode::Shipped => "forces shipped",
-                };
-                chart
-                    .draw_series(LineSeries::new(line, colour.stroke_width(2)))?
-                    .label(format!("{what}, {loss} % lost"))
-                    .legend(move |(x, y)| {
-                        PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2))
-                    });
-                let stable = points.iter().filter(|(_, _, stable)| *stable);
-                chart.draw_series(
-                    stable.map(|(x, y, _)| Circle::new((*x, *y), 4, colour.filled())),
-                )?;
-                let unstable = points.iter().filter(|(_, _, stable)| !stable);
-                chart.draw_series(
-                    unstable.map(|(x, y, _)| Cross::new((*x, *y), 5, colour.stroke_width(2))),
-                )?;
-            }
-        }
-        if k == 0 {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::Coordinate(8, 215))
-                .label_font(("sans-serif", 13))
-                .background_style(WHITE.mix(0.8))
-                .draw()?;
-        }
+        draw_panel(panel, task, k == 0, rows)?;
     }
     root.present()?;
     Ok(())
+}
+
+/// The `first` one has the description of its axis and the names of the lines.
+fn draw_panel(
+    panel: &DrawingArea<SVGBackend<'_>, Shift>,
+    task: &str,
+    first: bool,
+    rows: &[Row],
+) -> Result<(), Box<dyn Error>> {
+    let end = (DELAYS_MS.len() - 1) as f64;
+    let mut chart = ChartBuilder::on(panel)
+        .caption(task, ("sans-serif", 18))
+        .margin(10)
+        .x_label_area_size(38)
+        .y_label_area_size(if first { 62 } else { 48 })
+        .build_cartesian_2d(0.0..end, SHOWN.log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc("one-way delay, ms")
+        .y_desc(if first { "largest in the run, JND" } else { "" })
+        .x_labels(DELAYS_MS.len())
+        .x_label_formatter(&|place| {
+            let delay = DELAYS_MS.get(place.round() as usize);
+            delay.map_or(String::new(), |delay| format!("{delay:.0}"))
+        })
+        .y_label_formatter(&|jnd| format!("{jnd}"))
+        .light_line_style(WHITE)
+        .label_style(("sans-serif", 13))
+        .draw()?;
+    let legend = |style: ShapeStyle| {
+        move |(x, y): (i32, i32)| PathElement::new([(x, y), (x + 18, y)], style)
+    };
+    let black = BLACK.stroke_width(1);
+    chart
+        .draw_series(LineSeries::new([(0.0, 1.0), (end, 1.0)], black))?
+        .label("one just-noticeable difference")
+        .legend(legend(black));
+    for mode in [Mode::Edge, Mode::Shipped] {
+        for loss in SHOWN_LOSSES {
+            let (what, colour) = line_of(mode, loss);
+            let thick = colour.stroke_width(2);
+            let points = errors_by_delay(rows, task, mode, loss);
+            let line = points.iter().map(|(x, y, _)| (*x, *y));
+            chart
+                .draw_series(LineSeries::new(line, thick))?
+                .label(format!("{what}, {loss} % lost"))
+                .legend(legend(thick));
+            let stable = points.iter().filter(|(_, _, stable)| *stable);
+            chart.draw_series(stable.map(|(x, y, _)| Circle::new((*x, *y), 4, colour.filled())))?;
+            let unstable = points.iter().filter(|(_, _, stable)| !stable);
+            chart.draw_series(unstable.map(|(x, y, _)| Cross::new((*x, *y), 5, thick)))?;
+        }
+    }
+    if first {
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::Coordinate(8, 215))
+            .label_font(("sans-serif", 13))
+            .background_style(WHITE.mix(0.8))
+            .draw()?;
+    }
+    Ok(())
+}
+
+fn line_of(mode: Mode, loss: f64) -> (&'static str, RGBColor) {
+    match (mode, loss > 0.0) {
+        (Mode::Edge, false) => ("coupling at the edge", RGBColor(0x1f, 0x77, 0xb4)),
+        (Mode::Edge, true) => ("coupling at the edge", RGBColor(0x17, 0xa0, 0xb0)),
+        (Mode::Shipped, false) => ("forces shipped", RGBColor(0xd6, 0x27, 0x28)),
+        (Mode::Shipped, true) => ("forces shipped", RGBColor(0xff, 0x9a, 0x2e)),
+    }
+}
+
+/// Place of each delay on the axis, largest error there, and whether the run was stable.
+fn errors_by_delay(rows: &[Row], task: &str, mode: Mode, loss: f64) -> Vec<(f64, f64, bool)> {
+    let of_delay = |(place, delay): (usize, &f64)| {
+        let row = rows.iter().find(|row| {
+            row.task == task
+                && row.mode == mode
+                && row.loss_percent == loss
+                && row.delay_ms == *delay
+        })?;
+        let error = row.outcome.error.max.clamp(SHOWN.start, SHOWN.end);
+        Some((place as f64, error, row.outcome.stable))
+    };
+    DELAYS_MS.iter().enumerate().filter_map(of_delay).collect()
 }

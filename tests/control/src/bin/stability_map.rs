@@ -39,6 +39,25 @@ struct Panel {
     case: fn(f64) -> Case,
 }
 
+impl Panel {
+    /// The case at a place, held so, against a wall of this damping, N s/m.
+    fn held(&self, at: f64, hand: HandPreset, virtual_damping: f64) -> Case {
+        Case {
+            hand,
+            virtual_damping,
+            ..(self.case)(at)
+        }
+    }
+
+    /// So many places, evenly on a logarithmic axis.
+    fn places(&self, count: u32) -> impl Iterator<Item = f64> {
+        (0..count).map(move |i| {
+            let share = f64::from(i) / f64::from(count - 1);
+            self.from * (self.to / self.from).powf(share)
+        })
+    }
+}
+
 const STANDARD: Case = Case {
     damping: 1.0,
     virtual_damping: 0.0,
@@ -110,12 +129,6 @@ fn draw(
     panel: &Panel,
     csv: &mut String,
 ) -> Result<(), Box<dyn Error>> {
-    let places = |count: u32| {
-        (0..count).map(move |i| {
-            let share = f64::from(i) / f64::from(count - 1);
-            panel.from * (panel.to / panel.from).powf(share)
-        })
-    };
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .x_label_area_size(44)
@@ -134,27 +147,11 @@ fn draw(
         .light_line_style(RGBColor(235, 235, 235))
         .draw()?;
     for ((label, hand, virtual_damping), colour) in CURVES.into_iter().zip(COLOURS) {
-        let case = |at: f64| Case {
-            hand,
-            virtual_damping,
-            ..(panel.case)(at)
-        };
-        let [line, points] = POINTS;
-        let exact: Vec<_> = places(line)
-            .map(|at| (at, case(at).by_eigenvalues()))
-            .collect();
-        let rule: Vec<_> = places(line).map(|at| (at, by_rule(&case(at)))).collect();
-        let simulated: Vec<_> = places(points)
-            .map(|at| (at, case(at).by_simulation()))
-            .collect();
-        for (at, measured) in &simulated {
-            let (by_eigenvalues, by_rule) = (case(*at).by_eigenvalues(), by_rule(&case(*at)));
-            writeln!(
-                csv,
-                "{},{at:.4},{hand},{virtual_damping},{by_eigenvalues:.1},{by_rule:.1},{measured:.1}",
-                panel.name
-            )?;
-        }
+        let case = |at: f64| panel.held(at, hand, virtual_damping);
+        let line = || panel.places(POINTS[0]);
+        let exact: Vec<_> = line().map(|at| (at, case(at).by_eigenvalues())).collect();
+        let rule: Vec<_> = line().map(|at| (at, by_rule(&case(at)))).collect();
+        let simulated = simulate(panel, hand, virtual_damping, csv)?;
         chart
             .draw_series(LineSeries::new(exact, colour.stroke_width(2)))?
             .label(label)
@@ -176,6 +173,28 @@ fn draw(
             .draw()?;
     }
     Ok(())
+}
+
+/// The points of a curve; each is a row of the CSV too.
+fn simulate(
+    panel: &Panel,
+    hand: HandPreset,
+    virtual_damping: f64,
+    csv: &mut String,
+) -> Result<Vec<(f64, f64)>, std::fmt::Error> {
+    let mut points = Vec::new();
+    for at in panel.places(POINTS[1]) {
+        let case = panel.held(at, hand, virtual_damping);
+        let measured = case.by_simulation();
+        let (by_eigenvalues, by_rule) = (case.by_eigenvalues(), by_rule(&case));
+        writeln!(
+            csv,
+            "{},{at:.4},{hand},{virtual_damping},{by_eigenvalues:.1},{by_rule:.1},{measured:.1}",
+            panel.name
+        )?;
+        points.push((at, measured));
+    }
+    Ok(points)
 }
 
 fn by_rule(case: &Case) -> f64 {
