@@ -28,66 +28,74 @@ fn main() -> ExitCode {
     })
 }
 
-fn run() -> Result<ExitCode, Box<dyn Error>> {
+type Run = Result<ExitCode, Box<dyn Error>>;
+
+fn run() -> Run {
     let mut arguments = std::env::args().skip(1).peekable();
-    // A process of the isolation run: a client that can be stopped.
-    if arguments.next_if(|first| first == "--client").is_some() {
-        let words: Vec<String> = arguments.collect();
-        let [server, node, transport, key] = &words[..] else {
-            return Err("--client takes SERVER NODE TRANSPORT KEY".into());
-        };
-        client_process::client(server, node, transport, key.as_ref())?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    // The server of the fail-over run, which is killed.
-    if arguments.next_if(|first| first == "--lead").is_some() {
-        let words: Vec<String> = arguments.collect();
-        let [quic, udp, key, timeout_ms] = &words[..] else {
-            return Err("--lead takes QUIC UDP KEY MILLISECONDS".into());
-        };
-        let node_timeout = Duration::from_millis(timeout_ms.parse()?);
-        leader_process::lead(quic, udp, key.as_ref(), node_timeout)?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    // One node of a network of namespaces or machines.
-    if arguments.next_if(|first| first == "--node").is_some() {
-        let words: Vec<String> = arguments.collect();
-        let [server, node, transport, key, seconds] = &words[..] else {
-            return Err("--node takes SERVER NODE udp|quic KEY SECONDS".into());
-        };
-        let transport = match transport.as_str() {
-            "quic" => Transport::QuicDatagram,
-            _ => Transport::Udp,
-        };
-        let seconds = Duration::from_secs_f64(positive(seconds)?);
-        let got = node::run(server, node, transport, key.as_ref(), seconds)?;
-        println!(
-            "{node}: joined in {:.3} s, {} states, {} lost, {} refused, {} out of order; latency p50 {:.2} ms, p99 {:.2} ms, clock +-{:.3} ms",
-            got.joined_s,
-            got.states,
-            got.lost,
-            got.refused,
-            got.disordered,
-            got.latency_ms.p50,
-            got.latency_ms.p99,
-            got.clock_ms
-        );
-        let good = got.states > 0 && got.disordered == 0;
-        return Ok(ExitCode::from(u8::from(!good)));
-    }
-    if arguments.next_if(|first| first == "--help").is_some() {
-        print!("{}", help());
-        return Ok(ExitCode::SUCCESS);
-    }
-    let Arguments {
-        extent,
-        csv: file,
-        sections,
-    } = read(arguments)?;
+    let process = match arguments.peek().map(String::as_str) {
+        Some("--client") => client,
+        Some("--lead") => lead,
+        Some("--node") => one_node,
+        Some("--help") => {
+            print!("{}", help());
+            return Ok(ExitCode::SUCCESS);
+        }
+        _ => return report(read(arguments)?),
+    };
+    process(&arguments.skip(1).collect::<Vec<_>>())
+}
+
+/// A process of the isolation run: a client that can be stopped.
+fn client(words: &[String]) -> Run {
+    let [server, node, transport, key] = words else {
+        return Err("--client takes SERVER NODE TRANSPORT KEY".into());
+    };
+    client_process::client(server, node, transport, key.as_ref())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The server of the fail-over run, which is killed.
+fn lead(words: &[String]) -> Run {
+    let [quic, udp, key, timeout_ms] = words else {
+        return Err("--lead takes QUIC UDP KEY MILLISECONDS".into());
+    };
+    let node_timeout = Duration::from_millis(timeout_ms.parse()?);
+    leader_process::lead(quic, udp, key.as_ref(), node_timeout)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// One node of a network of namespaces or machines.
+fn one_node(words: &[String]) -> Run {
+    let [server, node, transport, key, seconds] = words else {
+        return Err("--node takes SERVER NODE udp|quic KEY SECONDS".into());
+    };
+    let transport = match transport.as_str() {
+        "quic" => Transport::QuicDatagram,
+        _ => Transport::Udp,
+    };
+    let seconds = Duration::from_secs_f64(positive(seconds)?);
+    let got = node::run(server, node, transport, key.as_ref(), seconds)?;
+    println!(
+        "{node}: joined in {:.3} s, {} states, {} lost, {} refused, {} out of order; latency p50 {:.2} ms, p99 {:.2} ms, clock +-{:.3} ms",
+        got.joined_s,
+        got.states,
+        got.lost,
+        got.refused,
+        got.disordered,
+        got.latency_ms.p50,
+        got.latency_ms.p99,
+        got.clock_ms
+    );
+    let good = got.states > 0 && got.disordered == 0;
+    Ok(ExitCode::from(u8::from(!good)))
+}
+
+/// Runs the sections that are wanted.
+fn report(arguments: Arguments) -> Run {
     let (mut rows, mut broken) = (Vec::<Row>::new(), false);
-    for section in sections {
+    for section in arguments.sections {
         eprintln!("{}: {}", section.name, section.about);
-        match (section.run)(&extent) {
+        match (section.run)(&arguments.extent) {
             Ok(new) => {
                 eprint!("{}", table(&new));
                 rows.extend(new);
@@ -99,7 +107,7 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         }
     }
     print!("{}", table(&rows));
-    if let Some(file) = file {
+    if let Some(file) = arguments.csv {
         std::fs::write(&file, csv(&rows))
             .map_err(|error| format!("{}: {error}", file.display()))?;
     }

@@ -67,21 +67,32 @@ fn a_server_that_stood_still_takes_the_frames_back_from_the_node_that_led() -> R
         .map(Screen::end)
         .collect::<Result<_, _>>()?;
     drop(server);
-    let mut frames: HashMap<u64, Vec<Swapped>> = HashMap::new();
     for node in &shown {
-        for pair in node.windows(2) {
-            assert!(
-                pair[0].frame < pair[1].frame,
-                "a number comes once: {pair:?}"
-            );
-        }
-        // Nobody joined anew: the sessions are those that the server had before.
-        assert!(node.iter().all(|swapped| swapped.sessions == 1));
-        let gap = longest_gap_ms(node, stopped, end);
-        assert!(gap < LONGEST_GAP_MS, "{gap} ms without a frame");
-        for swapped in node {
-            frames.entry(swapped.frame).or_default().push(*swapped);
-        }
+        assert_went_on(node, stopped, end);
+    }
+    assert_drawn_together(&shown, of_node, of_server);
+    Ok(())
+}
+
+/// In one session, frame after frame, without a long gap between two times.
+fn assert_went_on(node: &[Swapped], from: Instant, to: Instant) {
+    for pair in node.windows(2) {
+        assert!(
+            pair[0].frame < pair[1].frame,
+            "a number comes once: {pair:?}"
+        );
+    }
+    // Nobody joined anew: the sessions are those that the server had before.
+    assert!(node.iter().all(|swapped| swapped.sessions == 1));
+    let gap = longest_gap_ms(node, from, to);
+    assert!(gap < LONGEST_GAP_MS, "{gap} ms without a frame");
+}
+
+/// Each frame is one picture; `of_node` and `of_server` are frames before those of either term.
+fn assert_drawn_together(shown: &[Vec<Swapped>], of_node: u64, of_server: u64) {
+    let mut frames: HashMap<u64, Vec<Swapped>> = HashMap::new();
+    for swapped in shown.iter().flatten() {
+        frames.entry(swapped.frame).or_default().push(*swapped);
     }
     let mut states = [HashSet::new(), HashSet::new()];
     let mut whole = [0, 0];
@@ -103,5 +114,4 @@ fn a_server_that_stood_still_takes_the_frames_back_from_the_node_that_led() -> R
     );
     // Under each they swapped together; how often a busy machine leaves one of them behind is its own affair.
     assert!(whole.iter().all(|frames| *frames > 0), "{whole:?}");
-    Ok(())
 }

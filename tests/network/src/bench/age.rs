@@ -6,7 +6,8 @@
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-use taut_link::{ClientLink, ClusterKey, ReceivedState, Role, SessionClock, connect};
+use taut_link::{ClientLink, ClusterKey, ReceivedState, Role, ServerLink, SessionClock, connect};
+use tokio::runtime::Runtime;
 
 use super::threads::{on_own_thread, runtime};
 use super::{
@@ -69,18 +70,7 @@ fn measure_here(
     let treatments = vec![Treatment::default(), bad];
     let (server, relay) = serve_behind(&runtime, server_options(&key), treatments, seed)?;
     let clock = server.clock();
-    let mut clients: Vec<ClientLink> = Vec::new();
-    for node in ["control", "impaired"] {
-        let options = client_options(&server, &key, Role::Render, node);
-        clients.push(runtime.block_on(connect(options))?);
-        let opened = || {
-            server
-                .clients()
-                .iter()
-                .all(|client| client.udp_address.is_some())
-        };
-        wait_until("the path to open", opened)?; // one after the other: the relay numbers its flows so
-    }
+    let clients = connect_in_turn(&runtime, &server, &key)?;
     let mut broadcaster = server.broadcaster();
     let mut states = [Vec::new(), Vec::new()];
     let mut ticker = Ticker::new(PERIOD);
@@ -124,6 +114,24 @@ fn measure_here(
         wrong: states.iter().map(|states| wrong(states)).sum(),
         relay: counts,
     })
+}
+
+/// The client behind the good network, then the other: the relay numbers its flows so.
+fn connect_in_turn(
+    runtime: &Runtime,
+    server: &ServerLink,
+    key: &ClusterKey,
+) -> Result<Vec<ClientLink>, BenchError> {
+    let mut clients = Vec::new();
+    for node in ["control", "impaired"] {
+        let options = client_options(server, key, Role::Render, node);
+        clients.push(runtime.block_on(connect(options))?);
+        wait_until("the path to open", || {
+            let clients = server.clients();
+            clients.iter().all(|client| client.udp_address.is_some())
+        })?;
+    }
+    Ok(clients)
 }
 
 fn drain(clients: &[ClientLink], states: &mut [Vec<ReceivedState>; 2]) {

@@ -25,6 +25,15 @@ pub enum Death {
     Stopped,
 }
 
+impl Death {
+    pub(super) fn signal(self) -> Signal {
+        match self {
+            Self::Killed => Signal::KILL,
+            Self::Stopped => Signal::STOP,
+        }
+    }
+}
+
 /// What came of one death.
 #[derive(Clone, Copy, Debug)]
 pub struct Aftermath {
@@ -74,13 +83,8 @@ fn measure_here(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
     witness.drain_states(&mut states);
     states.clear();
 
-    let signal = if death == Death::Killed {
-        Signal::KILL
-    } else {
-        Signal::STOP
-    };
     let died = Instant::now();
-    victim.signal(signal)?;
+    victim.signal(death.signal())?;
     let mut let_go = None;
     wait_until("the server to let the node go", || {
         witness.drain_states(&mut states);

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use taut_link::{ClientOptions, ClusterKey, Role};
 use taut_proto::barrier::FRAMES_LEFT_OUT;
+use tokio::runtime::Runtime;
 
 use super::leader_process::{LeaderProcess, PRIORITY, RATE};
 use super::screen::{Screen, Swapped, longest_gap_ms, together};
@@ -59,18 +60,7 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
     let any = "127.0.0.1:0";
     let server = LeaderProcess::start(this, &path, (any, any), node_timeout)?;
     let (quic, udp) = (server.quic().to_owned(), server.udp().to_owned());
-    let mut screens = Vec::new();
-    for number in 0..NODES {
-        let name = format!("node{number}");
-        let options = ClientOptions {
-            priority: Some(PRIORITY),
-            ..ClientOptions::new(quic.clone(), key.clone(), Role::Render, name)
-        };
-        screens.push(Screen::start(&runtime, options, number as u64)?);
-    }
-    wait_until("frames", || {
-        screens.iter().all(|screen| screen.frame() > 2 * RATE)
-    })?;
+    let mut screens = start_screens(&runtime, &quic, &key)?;
     let in_step = Instant::now();
     wait_in_step(&screens, node_timeout)?;
     // A pause may have cost a node its first session.
@@ -126,6 +116,27 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
         different: by_all.different + by_two.different,
         back_s,
     })
+}
+
+/// All nodes, once each has shown frames.
+fn start_screens(
+    runtime: &Runtime,
+    quic: &str,
+    key: &ClusterKey,
+) -> Result<Vec<Screen>, BenchError> {
+    let mut screens = Vec::new();
+    for number in 0..NODES {
+        let name = format!("node{number}");
+        let options = ClientOptions {
+            priority: Some(PRIORITY),
+            ..ClientOptions::new(quic, key.clone(), Role::Render, name)
+        };
+        screens.push(Screen::start(runtime, options, number as u64)?);
+    }
+    wait_until("frames", || {
+        screens.iter().all(|screen| screen.frame() > 2 * RATE)
+    })?;
+    Ok(screens)
 }
 
 /// The swaps with their session counted from the one of number `first`, which is 1.

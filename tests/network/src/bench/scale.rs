@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use nix::sys::socket::{MsgFlags, MultiHeaders, SockaddrIn, sendmmsg};
 use rustix::time::{ClockId, clock_gettime};
-use taut_link::{MulticastOptions, ServerOptions, create_key_file, serve};
+use taut_link::{MulticastOptions, ServerLink, ServerOptions, create_key_file, serve};
 use taut_proto::Kind;
 use taut_proto::codec::encode_into;
 use taut_proto::header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES};
@@ -246,44 +246,54 @@ pub fn cost(
             == clients
     })?;
     let cost = on_own_thread("broadcast", || {
-        let (mut broadcaster, clock) = (server.broadcaster(), server.clock());
-        let mut tick = 0;
-        let mut send = || {
-            tick += 1;
-            let state = state(tick, clock.now_ns(), true);
-            let before = thread_time();
-            let report = broadcaster.send(&state);
-            let took = thread_time().saturating_sub(before);
-            std::thread::sleep(Duration::from_millis(1));
-            (took, report)
-        };
-        let by_group = || server.clients().iter().all(|client| client.by_multicast);
-        let begun = Instant::now();
-        while group.is_some() && !by_group() && begun.elapsed() < Duration::from_secs(20) {
-            send();
-        }
-        let before = taken_and_lost(&mut processes)?;
-        let (mut time, mut sent, mut due, mut states) = (Duration::ZERO, 0, 0, 0);
-        let begun = Instant::now();
-        while begun.elapsed().as_secs_f64() < seconds {
-            let (took, report) = send();
-            time += took;
-            sent += report.sent;
-            due += report.sent + report.skipped + report.failed;
-            states += 1;
-        }
-        let after = taken_and_lost(&mut processes)?;
-        let us = time.as_secs_f64() * 1e6;
-        Ok(Cost {
-            clients,
-            each: us / due.max(1) as f64,
-            state: us / f64::from(states.max(1)),
-            sent: sent as f64 / due.max(1) as f64,
-            taken: after[0] - before[0],
-            lost: after[1].saturating_sub(before[1]),
-        })
+        broadcast(&server, &mut processes, group.is_some(), seconds)
     });
     drop(processes);
     runtime.block_on(server.shutdown());
     cost
+}
+
+/// On this thread; `by_group`: once all of them hear the group.
+fn broadcast(
+    server: &ServerLink,
+    clients: &mut [Process],
+    by_group: bool,
+    seconds: f64,
+) -> Result<Cost, BenchError> {
+    let (mut broadcaster, clock) = (server.broadcaster(), server.clock());
+    let mut tick = 0;
+    let mut send = || {
+        tick += 1;
+        let state = state(tick, clock.now_ns(), true);
+        let before = thread_time();
+        let report = broadcaster.send(&state);
+        let took = thread_time().saturating_sub(before);
+        std::thread::sleep(Duration::from_millis(1));
+        (took, report)
+    };
+    let all_hear_it = || server.clients().iter().all(|client| client.by_multicast);
+    let begun = Instant::now();
+    while by_group && !all_hear_it() && begun.elapsed() < Duration::from_secs(20) {
+        send();
+    }
+    let before = taken_and_lost(clients)?;
+    let (mut time, mut sent, mut due, mut states) = (Duration::ZERO, 0, 0, 0);
+    let begun = Instant::now();
+    while begun.elapsed().as_secs_f64() < seconds {
+        let (took, report) = send();
+        time += took;
+        sent += report.sent;
+        due += report.sent + report.skipped + report.failed;
+        states += 1;
+    }
+    let after = taken_and_lost(clients)?;
+    let us = time.as_secs_f64() * 1e6;
+    Ok(Cost {
+        clients: clients.len(),
+        each: us / due.max(1) as f64,
+        state: us / f64::from(states.max(1)),
+        sent: sent as f64 / due.max(1) as f64,
+        taken: after[0] - before[0],
+        lost: after[1].saturating_sub(before[1]),
+    })
 }

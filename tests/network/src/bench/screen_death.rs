@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
-use taut_link::{ClientLink, ClientOptions, Role};
+use taut_link::{ClientLink, ClientOptions, ClusterKey, Role};
 use tokio::runtime::Runtime;
 
 use super::death::Death;
@@ -50,13 +50,7 @@ pub fn measure(program: &Path, death: Death) -> Result<ScreenDeath, BenchError> 
     let rate = RATE.to_string();
     let workbench = Workbench::new(program, |file| set(file, "frames.rate", RATE as i64))?;
     let server = workbench.serve(None)?;
-    let options = ClientOptions::new(
-        server.quic.clone(),
-        workbench.key()?,
-        Role::Render,
-        "witness",
-    );
-    let (witness, _runtime) = start_witness(options)?;
+    let (witness, _runtime) = start_witness(&server.quic, workbench.key()?)?;
     let small = [
         "--headless",
         "--width",
@@ -79,10 +73,7 @@ pub fn measure(program: &Path, death: Death) -> Result<ScreenDeath, BenchError> 
     std::thread::sleep(WARM_UP);
 
     let died = Instant::now();
-    victim.signal(match death {
-        Death::Killed => Signal::KILL,
-        Death::Stopped => Signal::STOP,
-    })?;
+    victim.signal(death.signal())?;
     wait_until("the server to let the node go", || {
         number_of(witness.link(), VICTIM).is_none()
     })?;
@@ -123,7 +114,8 @@ pub fn measure(program: &Path, death: Death) -> Result<ScreenDeath, BenchError> 
 
 /// The node that sees every swap, with the runtime that it lives on: of the real-time class where the system grants it, as the threads of the processes that
 /// draw are not, and the processes that are started later.
-fn start_witness(options: ClientOptions) -> Result<(Screen, Runtime), BenchError> {
+fn start_witness(quic: &str, key: ClusterKey) -> Result<(Screen, Runtime), BenchError> {
+    let options = ClientOptions::new(quic, key, Role::Render, "witness");
     on_own_thread("witness", || {
         let _ = request_fifo(PRIORITY);
         let runtime = runtime(1)?;

@@ -6,8 +6,9 @@ use taut_proto::barrier::Swap;
 
 use super::row::{Row, brief};
 use super::sections::Extent;
+use crate::bench::failover::{self, Failover};
 use crate::bench::skew::{self, OverTurns, Plan, Skew, Turns};
-use crate::bench::{BenchError, Quantiles, failover, leader_process};
+use crate::bench::{BenchError, Quantiles, leader_process};
 
 /// Swap-call skew of a quiet machine: p50 and p99, us.
 const SKEW_US: (f64, f64) = (20.0, 100.0);
@@ -127,21 +128,40 @@ pub(super) fn skew_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     Ok(rows)
 }
 
+/// While a node leads, beside that while the server did.
+fn skew_of_leader(runs: &[Failover], setting: &str) -> Row {
+    let over = |of: fn(&Failover) -> f64| OverTurns::of(runs.iter().map(of).collect());
+    let led = over(|run| run.skew_us.p99);
+    let by_server = over(|run| run.server_skew_us.p99);
+    Row::at_most_beside(
+        format!(
+            "fail-over: swap-call skew while a node leads: p99, median of {} runs",
+            led.each.len()
+        ),
+        led.median,
+        SKEW_US.1,
+        "us",
+        ("p99 while the server leads", by_server.median),
+        format!(
+            "runs {}; p50 {} us; while the server led {}, median {}; {setting}",
+            each(&led),
+            brief(over(|run| run.skew_us.p50).median),
+            each(&by_server),
+            brief(by_server.median),
+        ),
+    )
+}
+
 /// The server dies, then the node that leads, then there is a server again.
 pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     let mut runs = Vec::new();
     for _ in 0..extent.deaths.min(3) {
         runs.push(failover::measure(&extent.this, extent.node_timeout)?);
     }
-    let worst = |of: fn(&failover::Failover) -> f64| {
+    let worst = |of: fn(&Failover) -> f64| {
         let values = runs.iter().map(of);
         values.max_by(f64::total_cmp).unwrap_or(f64::NAN)
     };
-    let over = |of: fn(&failover::Failover) -> f64| OverTurns::of(runs.iter().map(of).collect());
-    let (led, by_server) = (
-        over(|run| run.skew_us.p99),
-        over(|run| run.server_skew_us.p99),
-    );
     let fifo = runs.iter().all(|run| run.fifo);
     let setting = format!(
         "largest of {}, {} nodes at {} Hz, {}",
@@ -168,23 +188,7 @@ pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
             FAILOVER_MS,
             "ms",
         ),
-        Row::at_most_beside(
-            format!(
-                "fail-over: swap-call skew while a node leads: p99, median of {} runs",
-                led.each.len()
-            ),
-            led.median,
-            SKEW_US.1,
-            "us",
-            ("p99 while the server leads", by_server.median),
-            format!(
-                "runs {}; p50 {} us; while the server led {}, median {}; {setting}",
-                each(&led),
-                brief(over(|run| run.skew_us.p50).median),
-                each(&by_server),
-                brief(by_server.median),
-            ),
-        ),
+        skew_of_leader(&runs, &setting),
         row(
             "nodes back, from the start of the next server's process",
             worst(|run| run.back_s),
