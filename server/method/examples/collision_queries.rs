@@ -28,6 +28,7 @@ use god_object::collision::{
 };
 use god_object::nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion};
 use god_object::{Mesh, Pose, Vector6};
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use taut_test_kit::thread_cpu_us;
 
@@ -40,6 +41,9 @@ const BUNNY_GAPS: [f64; 5] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 const BUNNY_SIZE: f64 = 0.15;
 /// Each query is timed so often; the best counts.
 const REPEATS: usize = 5;
+const SETS: [&str; 2] = ["vertex-face and edge-edge queries", "bunny on bunny"];
+/// What the axes of gaps show.
+const GAPS: std::ops::Range<f64> = 1e-12..1e-2;
 /// Below what a chart with a logarithmic axis can show, a fraction of the motion.
 const LEAST_EARLINESS: f64 = 1e-17;
 
@@ -117,7 +121,7 @@ fn queries_at(queries: &[Query], truths: &[Option<[f64; 2]>], relative_gap: f64)
         }
     }
     Row {
-        set: "vertex-face and edge-edge queries",
+        set: SETS[0],
         relative_gap,
         queries: queries.len(),
         contacts: truths.iter().flatten().count(),
@@ -197,7 +201,7 @@ fn bunnies() -> Result<Vec<Row>, Box<dyn Error>> {
             }
         }
         Row {
-            set: "bunny on bunny",
+            set: SETS[1],
             relative_gap: minimum_gap / BUNNY_SIZE,
             queries: motions.len(),
             contacts: motions.iter().filter(|(_, _, t)| t.is_some()).count(),
@@ -224,18 +228,24 @@ fn percentiles(values: &mut [f64]) -> [f64; 3] {
 }
 
 fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
-    let sets = ["vertex-face and edge-edge queries", "bunny on bunny"];
     let area = SVGBackend::new(path, (1100, 420)).into_drawing_area();
     area.fill(&WHITE)?;
     let panels = area.split_evenly((1, 2));
-    let gaps = (1e-12..1e-2).log_scale();
+    draw_false_positives(&panels[0], rows)?;
+    draw_earliness(&panels[1], rows)?;
+    area.present()?;
+    Ok(())
+}
 
-    let mut chart = ChartBuilder::on(&panels[0])
+type Panel<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+fn draw_false_positives(panel: &Panel<'_>, rows: &[Row]) -> Result<(), Box<dyn Error>> {
+    let mut chart = ChartBuilder::on(panel)
         .caption("near misses taken for contacts", ("sans-serif", 18))
         .margin(12)
         .x_label_area_size(40)
         .y_label_area_size(50)
-        .build_cartesian_2d(gaps.clone(), 0.0..15.0)?;
+        .build_cartesian_2d(GAPS.log_scale(), 0.0..15.0)?;
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -243,7 +253,7 @@ fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         .y_desc("% of those without contact")
         .x_label_formatter(&|x| format!("{x:.0e}"))
         .draw()?;
-    for (k, set) in sets.iter().enumerate() {
+    for (k, set) in SETS.iter().enumerate() {
         let colour = Palette99::pick(k).to_rgba();
         let share = |row: &Row| {
             100.0 * row.false_positives as f64 / (row.queries - row.contacts).max(1) as f64
@@ -263,13 +273,16 @@ fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         .border_style(BLACK.mix(0.3))
         .background_style(WHITE)
         .draw()?;
+    Ok(())
+}
 
-    let mut chart = ChartBuilder::on(&panels[1])
+fn draw_earliness(panel: &Panel<'_>, rows: &[Row]) -> Result<(), Box<dyn Error>> {
+    let mut chart = ChartBuilder::on(panel)
         .caption("how early a contact is found", ("sans-serif", 18))
         .margin(12)
         .x_label_area_size(40)
         .y_label_area_size(60)
-        .build_cartesian_2d(gaps, (LEAST_EARLINESS..1.0).log_scale())?;
+        .build_cartesian_2d(GAPS.log_scale(), (LEAST_EARLINESS..1.0).log_scale())?;
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -278,7 +291,7 @@ fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         .x_label_formatter(&|x| format!("{x:.0e}"))
         .y_label_formatter(&|y| format!("{y:.0e}"))
         .draw()?;
-    for (k, set) in sets.iter().enumerate() {
+    for (k, set) in SETS.iter().enumerate() {
         for (which, name) in ["p50", "p99", "greatest"].iter().enumerate() {
             let colour = Palette99::pick(k).to_rgba().mix([0.4, 0.7, 1.0][which]);
             let points = rows.iter().filter(|row| row.set == *set);
@@ -299,6 +312,5 @@ fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         .border_style(BLACK.mix(0.3))
         .background_style(WHITE)
         .draw()?;
-    area.present()?;
     Ok(())
 }

@@ -7,7 +7,7 @@ use crate::mesh_distance::distance;
 use god_object::collision::{CollisionWorkspace, Work, meshes_intersect};
 use god_object::constraint::{Collected, Contact, Feature, collect_contacts};
 use god_object::geometry::Mesh;
-use god_object::nalgebra::{Point3, Vector3};
+use god_object::nalgebra::{DMatrix, DVector, Point3, Vector3};
 use god_object::spatial::Pose;
 use proptest::prelude::*;
 
@@ -272,6 +272,51 @@ fn worst_slope(m: &Mesh, pose: &Pose, feature: Feature, outward: &Vector3<f64>) 
     }
 }
 
+/// All features of a mesh, each with its corners.
+fn features_of(m: &Mesh, pose: &Pose) -> Vec<(Feature, Vec<Point3<f64>>)> {
+    let at = |v: u32| pose * m.vertices()[v as usize];
+    let vertices = (0..m.vertices().len() as u32).map(|v| (Feature::Vertex(v), vec![at(v)]));
+    let edges = m
+        .edges()
+        .iter()
+        .enumerate()
+        .map(|(e, edge)| (Feature::Edge(e as u32), edge.vertices.map(at).to_vec()));
+    let faces = m
+        .triangles()
+        .iter()
+        .enumerate()
+        .map(|(t, c)| (Feature::Face(t as u32), c.map(at).to_vec()));
+    vertices.chain(edges).chain(faces).collect()
+}
+
+/// From the nearest point of one feature to that of the other, `a` less `b`, where both are inside by more than `margin`.
+fn between(a: &[Point3<f64>], b: &[Point3<f64>], margin: f64) -> Option<Vector3<f64>> {
+    // Closest points of the affine hulls by least squares: y0 + B u - x0 - A s.
+    let columns: Vec<Vector3<f64>> = a[1..]
+        .iter()
+        .map(|p| p - a[0])
+        .chain(b[1..].iter().map(|p| b[0] - p))
+        .collect();
+    let r = a[0] - b[0];
+    let solution = match columns.len() {
+        0 => vec![],
+        n if n <= 2 => {
+            let m = DMatrix::from_fn(n, n, |i, j| columns[i].dot(&columns[j]));
+            let rhs = DVector::from_fn(n, |i, _| -columns[i].dot(&r));
+            m.lu().solve(&rhs)?.iter().copied().collect()
+        }
+        _ => return None,
+    };
+    let (s, t) = solution.split_at(a.len() - 1);
+    let inside = |w: &[f64]| w.iter().all(|c| *c > margin) && w.iter().sum::<f64>() < 1.0 - margin;
+    let is_inside = (inside(s) || s.is_empty()) && (inside(t) || t.is_empty());
+    let difference = columns
+        .iter()
+        .zip(&solution)
+        .fold(r, |d, (c, s)| d + c * *s);
+    is_inside.then_some(difference)
+}
+
 /// Every pair of features whose closest points are inside both and within the activation distance, with the least slope; no tree, no owner, no prune.
 fn brute_force(
     body: &Mesh,
@@ -283,54 +328,11 @@ fn brute_force(
     margin: f64,
 ) -> BTreeSet<(Feature, Feature)> {
     let mut found = BTreeSet::new();
-    let parts = |m: &Mesh, pose: &Pose| -> Vec<(Feature, Vec<Point3<f64>>)> {
-        let at = |v: u32| pose * m.vertices()[v as usize];
-        let vertices = (0..m.vertices().len() as u32).map(|v| (Feature::Vertex(v), vec![at(v)]));
-        let edges = m
-            .edges()
-            .iter()
-            .enumerate()
-            .map(|(e, edge)| (Feature::Edge(e as u32), edge.vertices.map(at).to_vec()));
-        let faces = m
-            .triangles()
-            .iter()
-            .enumerate()
-            .map(|(t, c)| (Feature::Face(t as u32), c.map(at).to_vec()));
-        vertices.chain(edges).chain(faces).collect()
-    };
-    for (fa, pa) in &parts(body, body_pose) {
-        for (fb, pb) in &parts(obstacle, obstacle_pose) {
-            // Closest points of the affine hulls by least squares: y0 + B u - x0 - A s.
-            let columns: Vec<Vector3<f64>> = pa[1..]
-                .iter()
-                .map(|p| p - pa[0])
-                .chain(pb[1..].iter().map(|p| pb[0] - p))
-                .collect();
-            let r = pa[0] - pb[0];
-            let solution = match columns.len() {
-                0 => vec![],
-                n if n <= 2 => {
-                    let m = god_object::nalgebra::DMatrix::from_fn(n, n, |i, j| {
-                        columns[i].dot(&columns[j])
-                    });
-                    let rhs = god_object::nalgebra::DVector::from_fn(n, |i, _| -columns[i].dot(&r));
-                    match m.lu().solve(&rhs) {
-                        Some(s) => s.iter().copied().collect(),
-                        None => continue,
-                    }
-                }
-                _ => continue,
-            };
-            let (s, t) = solution.split_at(pa.len() - 1);
-            let inside =
-                |w: &[f64]| w.iter().all(|c| *c > margin) && w.iter().sum::<f64>() < 1.0 - margin;
-            if !inside(s) && !s.is_empty() || !inside(t) && !t.is_empty() {
+    for (fa, pa) in &features_of(body, body_pose) {
+        for (fb, pb) in &features_of(obstacle, obstacle_pose) {
+            let Some(difference) = between(pa, pb, margin) else {
                 continue;
-            }
-            let difference = columns
-                .iter()
-                .zip(&solution)
-                .fold(r, |d, (c, s)| d + c * *s);
+            };
             let gap = difference.norm();
             if gap > activation {
                 continue;

@@ -169,70 +169,75 @@ fn a_sphere_stops_at_the_closed_form_over_a_plane() {
     assert!((1e-5..=1.1e-5).contains(&gap), "{gap}");
 }
 
+/// Name, form, whether it stands, height of its middle, displacement and turn.
+type Case = (&'static str, Form, bool, f64, [f64; 3], [f64; 3]);
+
+const AT_THE_GAP: [Case; 7] = [
+    (
+        "sphere slides",
+        Form::Sphere(0.01),
+        false,
+        0.01,
+        [0.1, 0.05, 0.0],
+        [0.0, 0.0, 0.0],
+    ),
+    (
+        "sphere rolls",
+        Form::Sphere(0.01),
+        false,
+        0.01,
+        [0.01, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+    ),
+    (
+        "cylinder lies and rolls",
+        Form::Cylinder(0.01, 0.03),
+        false,
+        0.01,
+        [0.01, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+    ),
+    (
+        "cylinder lies and yaws",
+        Form::Cylinder(0.01, 0.03),
+        false,
+        0.01,
+        [0.01, 0.02, 0.0],
+        [0.0, 0.0, 1.0],
+    ),
+    (
+        "cylinder stands and yaws",
+        Form::Cylinder(0.01, 0.03),
+        true,
+        0.03,
+        [0.01, 0.02, 0.0],
+        [0.0, 0.0, 2.0],
+    ),
+    (
+        "capsule lies and yaws",
+        Form::Capsule(0.01, 0.03),
+        false,
+        0.01,
+        [0.01, 0.02, 0.0],
+        [0.0, 0.0, 1.0],
+    ),
+    (
+        "cube yaws and leaves",
+        Form::Cube(0.01),
+        false,
+        0.01,
+        [0.0, 0.0, 0.01],
+        [0.0, 0.0, 1.0],
+    ),
+];
+
 #[test]
 fn bodies_at_the_minimum_gap_may_slide_roll_yaw_and_leave() {
     let gap = SETTINGS.minimum_gap;
     let lying = UnitQuaternion::identity();
     let standing = shape_support::turned(Vector3::x(), std::f64::consts::FRAC_PI_2);
-    let cases = [
-        (
-            "sphere slides",
-            Form::Sphere(0.01),
-            lying,
-            0.01,
-            [0.1, 0.05, 0.0],
-            [0.0, 0.0, 0.0],
-        ),
-        (
-            "sphere rolls",
-            Form::Sphere(0.01),
-            lying,
-            0.01,
-            [0.01, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-        ),
-        (
-            "cylinder lies and rolls",
-            Form::Cylinder(0.01, 0.03),
-            lying,
-            0.01,
-            [0.01, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-        ),
-        (
-            "cylinder lies and yaws",
-            Form::Cylinder(0.01, 0.03),
-            lying,
-            0.01,
-            [0.01, 0.02, 0.0],
-            [0.0, 0.0, 1.0],
-        ),
-        (
-            "cylinder stands and yaws",
-            Form::Cylinder(0.01, 0.03),
-            standing,
-            0.03,
-            [0.01, 0.02, 0.0],
-            [0.0, 0.0, 2.0],
-        ),
-        (
-            "capsule lies and yaws",
-            Form::Capsule(0.01, 0.03),
-            lying,
-            0.01,
-            [0.01, 0.02, 0.0],
-            [0.0, 0.0, 1.0],
-        ),
-        (
-            "cube yaws and leaves",
-            Form::Cube(0.01),
-            lying,
-            0.01,
-            [0.0, 0.0, 0.01],
-            [0.0, 0.0, 1.0],
-        ),
-    ];
-    for (name, form, rotation, height, path, spin) in cases {
+    for (name, form, stands, height, path, spin) in AT_THE_GAP {
+        let rotation = if stands { standing } else { lying };
         let start = Pose::from_parts(Vector3::new(0.0, 0.0, height + gap).into(), rotation);
         let displacement = six(&Vector3::from(path), &Vector3::from(spin));
         let found = search(form, &start, &displacement, Form::Plane, &Pose::identity());

@@ -7,7 +7,7 @@ use god_object::collision::{
     AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
 };
 use god_object::spatial::six;
-use god_object::{Pose, Settings, World};
+use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Point3, Vector3};
 use taut_method_tests::checker::PenetrationChecker;
 use taut_method_tests::motion::Led;
@@ -17,19 +17,38 @@ use taut_scene::shapes::{Axis, cuboid, cylinder};
 /// K_t of 1 kg and the default gains, N/m.
 const STIFFNESS: f64 = 1000.0;
 
+/// A cube of this half side, and a plate whose upper face is z = 0.
+fn cube_over_plate(half: f64, thickness: f64, side: f64) -> Arc<World> {
+    let plate = mesh(cuboid([side, side, 0.5 * thickness]));
+    let below = Pose::translation(0.0, 0.0, -0.5 * thickness);
+    Arc::new(World {
+        body: body(mesh(cuboid([half; 3]))),
+        obstacles: vec![obstacle("plate", plate, below)],
+    })
+}
+
+/// Across the plate alone, and there what the depth asks for, to the limit; lengths of a metre are `scale` metres.
+fn assert_force(wrench: &Vector6, depth: f64, settings: &Settings, scale: f64, time: f64) {
+    assert!(wrench.fixed_rows::<2>(0).norm() <= 1e-6 * scale, "{wrench}");
+    let (force, expected) = (wrench[2], STIFFNESS * depth);
+    if expected > settings.force_limit {
+        assert!(
+            (force - settings.force_limit).abs() <= 1e-9 * settings.force_limit,
+            "{force} N at {time} s"
+        );
+    } else if expected < -STIFFNESS * 2.0 * settings.rest_distance {
+        assert_eq!(force, 0.0, "a force in the air at {time} s");
+    } else {
+        let slack = STIFFNESS * (2.0 * settings.rest_distance + 1e-9 * scale);
+        assert!((force - expected).abs() <= slack, "{force}, not {expected}");
+    }
+}
+
 /// A cube is pushed through a plate, stays below it, slides there and comes back. Lengths of a metre are `scale` metres.
 fn pushed_through(thickness: f64, scale: f64) {
     let half = 0.005 * scale;
     let lowest = -half;
-    let plate = mesh(cuboid([0.1 * scale, 0.1 * scale, 0.5 * thickness * scale]));
-    let world = Arc::new(World {
-        body: body(mesh(cuboid([half; 3]))),
-        obstacles: vec![obstacle(
-            "plate",
-            plate,
-            Pose::translation(0.0, 0.0, -0.5 * thickness * scale),
-        )],
-    });
+    let world = cube_over_plate(half, thickness * scale, 0.1 * scale);
     let checker = PenetrationChecker::new(&world);
     let mut settings = Settings::for_size(2.0 * half);
     settings.force_limit = 20.0 * scale;
@@ -63,24 +82,8 @@ fn pushed_through(thickness: f64, scale: f64) {
                 sample.god_object
             );
             assert!(checker.penetrated(&sample.god_object).is_none());
+            assert_force(&sample.wrench, -(device.z + lowest), &settings, scale, time);
             let force = sample.wrench[2];
-            assert!(
-                sample.wrench.fixed_rows::<2>(0).norm() <= 1e-6 * scale,
-                "{}",
-                sample.wrench
-            );
-            let expected = STIFFNESS * -(device.z + lowest);
-            if expected > settings.force_limit {
-                assert!(
-                    (force - settings.force_limit).abs() <= 1e-9 * settings.force_limit,
-                    "{force} N at {time} s"
-                );
-            } else if expected < -STIFFNESS * 2.0 * settings.rest_distance {
-                assert_eq!(force, 0.0, "a force in the air at {time} s");
-            } else {
-                let slack = STIFFNESS * (2.0 * settings.rest_distance + 1e-9 * scale);
-                assert!((force - expected).abs() <= slack, "{force}, not {expected}");
-            }
             assert!(
                 (force - last_force).abs() <= 1.5 * STIFFNESS * speed * period,
                 "{last_force} to {force} N at {time} s"

@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use god_object::{ForceShading, Obstacle, Pose, Primitive, Settings, Surface, World};
+use god_object::{ForceShading, Mesh, Obstacle, Pose, Primitive, Settings, Surface, World};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
+use taut_scene::RawMesh;
 
 use super::shapes::{Tessellation, bore, plate, rough, shaft};
 use super::{Feel, Fit, Motion, Moving, Variant};
@@ -31,6 +32,11 @@ const RAMP: f64 = 0.05;
 /// A part that moves does so with this amplitude (m) and period (s).
 const MOVED: f64 = 1e-4;
 const MOVED_PERIOD: f64 = 0.3;
+/// One cell for each side of a plate.
+const COARSE: Tessellation = Tessellation {
+    facets: 12,
+    bands: 1,
+};
 
 /// A variant that is ready to run.
 #[derive(Debug)]
@@ -55,41 +61,14 @@ impl VariantScene {
         let mut random = Random(variant.seed);
         let place = Vector3::from_fn(|_, _| random.unit() - 0.5);
         let frame = Pose::from_parts(place.into(), random.rotation());
-        let play = variant.clearance + ROUGH_SHARE * variant.roughness;
-        let noisy = |raw, which| mesh(rough(raw, variant.roughness, 10 * variant.seed + which));
-        let plain = |z: f64| frame * Pose::translation(0.0, 0.0, z);
-        let mut obstacles = Vec::new();
-        let (held, start, size) = match variant.fit {
-            Fit::PegInHole | Fit::ShaftInBore => {
-                let half = if variant.fit == Fit::PegInHole {
-                    HALF_HOLE
-                } else {
-                    HALF_BORE
-                };
-                let hole = bore(RADIUS, play, half, variant.obstacle, variant.turned);
-                obstacles.push(obstacle("hole", noisy(hole, 1), frame));
-                if variant.fit == Fit::PegInHole {
-                    let coarse = Tessellation {
-                        facets: 12,
-                        bands: 1,
-                    };
-                    let stop = plate([15e-3, 15e-3, 2e-3], coarse, 0.0);
-                    let below = -HALF_SHAFT - STOP_BELOW - 4e-3;
-                    obstacles.push(obstacle("stop", mesh(stop), plain(below)));
-                }
-                let peg = shaft(RADIUS, HALF_SHAFT, variant.body, variant.crown);
-                (noisy(peg, 0), frame, 2.0 * HALF_SHAFT)
-            }
-            Fit::PlateInSlot | Fit::PlateOnTable => {
-                let table = plate([0.1, 0.1, 10e-3], variant.obstacle, 0.0);
-                obstacles.push(obstacle("table", noisy(table.clone(), 1), plain(-20e-3)));
-                if variant.fit == Fit::PlateInSlot {
-                    let over = 2.0 * (PLATE[2] + play);
-                    obstacles.push(obstacle("cover", noisy(table, 2), plain(over)));
-                }
-                let moved = plate(PLATE, variant.body, variant.crown);
-                (noisy(moved, 0), plain(play), 2.0 * PLATE[0])
-            }
+        let Parts {
+            held,
+            start,
+            size,
+            mut obstacles,
+        } = match variant.fit {
+            Fit::PegInHole | Fit::ShaftInBore => Parts::of_shaft(variant, frame),
+            Fit::PlateInSlot | Fit::PlateOnTable => Parts::of_plate(variant, frame),
         };
         let surface = surface(variant.feel);
         obstacles
@@ -98,20 +77,15 @@ impl VariantScene {
         if variant.floor {
             obstacles.push(floor(&frame));
         }
-        let moved = match variant.moving {
+        let moving = match variant.moving {
             Moving::Nothing => None,
-            Moving::Holder => Some((0, obstacles[0].pose)),
+            Moving::Holder => Some(0),
             Moving::Aside => {
-                let coarse = Tessellation {
-                    facets: 12,
-                    bands: 1,
-                };
-                let part = plate([5e-3; 3], coarse, 0.0);
-                let pose = frame * Pose::translation(0.2, 0.1, 0.0);
-                obstacles.push(obstacle("aside", mesh(part), pose));
-                Some((obstacles.len() - 1, pose))
+                obstacles.push(aside(&frame));
+                Some(obstacles.len() - 1)
             }
         };
+        let moved = moving.map(|index| (index, obstacles[index].pose));
         let settings = Settings {
             adaptation: None,
             force_limit: 1e3,
@@ -156,6 +130,64 @@ impl VariantScene {
     }
 }
 
+/// What is held, with its start and size (m), and what it fits.
+struct Parts {
+    held: Mesh,
+    start: Pose,
+    size: f64,
+    obstacles: Vec<Obstacle>,
+}
+
+impl Parts {
+    fn of_shaft(variant: &Variant, frame: Pose) -> Self {
+        let is_peg = variant.fit == Fit::PegInHole;
+        let half = if is_peg { HALF_HOLE } else { HALF_BORE };
+        let play = play(variant);
+        let hole = bore(RADIUS, play, half, variant.obstacle, variant.turned);
+        let mut obstacles = vec![obstacle("hole", noisy(variant, hole, 1), frame)];
+        if is_peg {
+            let stop = plate([15e-3, 15e-3, 2e-3], COARSE, 0.0);
+            let below = Pose::translation(0.0, 0.0, -HALF_SHAFT - STOP_BELOW - 4e-3);
+            obstacles.push(obstacle("stop", mesh(stop), frame * below));
+        }
+        let peg = shaft(RADIUS, HALF_SHAFT, variant.body, variant.crown);
+        Self {
+            held: noisy(variant, peg, 0),
+            start: frame,
+            size: 2.0 * HALF_SHAFT,
+            obstacles,
+        }
+    }
+
+    fn of_plate(variant: &Variant, frame: Pose) -> Self {
+        let at = |z: f64| frame * Pose::translation(0.0, 0.0, z);
+        let table = plate([0.1, 0.1, 10e-3], variant.obstacle, 0.0);
+        let below = noisy(variant, table.clone(), 1);
+        let mut obstacles = vec![obstacle("table", below, at(-20e-3))];
+        if variant.fit == Fit::PlateInSlot {
+            let over = 2.0 * (PLATE[2] + play(variant));
+            obstacles.push(obstacle("cover", noisy(variant, table, 2), at(over)));
+        }
+        let moved = plate(PLATE, variant.body, variant.crown);
+        Self {
+            held: noisy(variant, moved, 0),
+            start: at(play(variant)),
+            size: 2.0 * PLATE[0],
+            obstacles,
+        }
+    }
+}
+
+/// Between the parts when nothing presses, m.
+fn play(variant: &Variant) -> f64 {
+    variant.clearance + ROUGH_SHARE * variant.roughness
+}
+
+/// `which`: the part of the variant, of which each is rough in its own way.
+fn noisy(variant: &Variant, raw: RawMesh, which: u64) -> Mesh {
+    mesh(rough(raw, variant.roughness, 10 * variant.seed + which))
+}
+
 fn surface(feel: Feel) -> Surface {
     match feel {
         Feel::Plain => Surface::default(),
@@ -172,11 +204,7 @@ fn surface(feel: Feel) -> Surface {
 
 /// A half-space a metre below.
 fn floor(frame: &Pose) -> Obstacle {
-    let coarse = Tessellation {
-        facets: 12,
-        bands: 1,
-    };
-    let slab = mesh(plate([0.5, 0.5, 0.01], coarse, 0.0));
+    let slab = mesh(plate([0.5, 0.5, 0.01], COARSE, 0.0));
     let pose = frame * Pose::translation(0.0, 0.0, -1.0);
     Obstacle {
         primitive: Some(Primitive::Plane {
@@ -185,6 +213,12 @@ fn floor(frame: &Pose) -> Obstacle {
         }),
         ..obstacle("floor", slab, pose)
     }
+}
+
+/// A part that is out of the way.
+fn aside(frame: &Pose) -> Obstacle {
+    let pose = frame * Pose::translation(0.2, 0.1, 0.0);
+    obstacle("aside", mesh(plate([5e-3; 3], COARSE, 0.0)), pose)
 }
 
 /// A sine of time with this period, s.
