@@ -8,7 +8,7 @@ use nalgebra::{Point3, Similarity3};
 use taut_proto::scene::{
     BodyDescription, NodeDescription, SceneDescription, ScreenDescription, Show, Stereo,
 };
-use taut_proto::{MeshBlob, Panorama, PoseF64};
+use taut_proto::{MeshBlob, Panorama, PoseF64, Untrusted};
 
 use crate::comfort::Comfort;
 use crate::correction::Correction;
@@ -57,6 +57,20 @@ pub(crate) fn find_node<'a>(
                 .collect::<Vec<_>>()
                 .join(", "),
         },
+    })
+}
+
+/// The description of a screen that a node names.
+fn find_screen<'a>(
+    description: &'a SceneDescription,
+    node: &NodeDescription,
+    name: &Untrusted,
+) -> Result<&'a ScreenDescription, RenderError> {
+    let mut screens = description.screens.iter();
+    let found = screens.find(|screen| screen.name == *name);
+    found.ok_or_else(|| RenderError::UnknownScreen {
+        node: node.name.to_string(),
+        screen: name.to_string(),
     })
 }
 
@@ -128,14 +142,7 @@ pub(crate) fn stage(
     };
     let obstacle = |(index, described)| body(index as u16, index + 1, described);
     let screens = node.screens.iter().map(|name| {
-        let found = description
-            .screens
-            .iter()
-            .find(|screen| screen.name == *name);
-        let described = found.ok_or_else(|| RenderError::UnknownScreen {
-            node: node.name.to_string(),
-            screen: name.to_string(),
-        })?;
+        let described = find_screen(description, node, name)?;
         stage_screen(described, node, overrides)
     });
     Ok(Stage {

@@ -43,18 +43,12 @@ pub const NO_LOOK: u32 = u32::MAX;
 pub fn shade(mesh: &TriangleMesh) -> Shaded {
     let welded = weld(mesh);
     let corner = |index: u32| Vector3::from(mesh.vertices[index as usize]);
-    let known = |t: &&[u32; 3]| t.iter().all(|&i| (i as usize) < mesh.vertices.len());
-    let look_of = |triangle: usize| {
-        let looks = mesh.looks.as_ref();
-        let place = looks.and_then(|looks| looks.of_triangles.get(triangle));
-        place.map_or(NO_LOOK, |place| u32::from(*place))
-    };
-    let (triangles, looks): (Vec<[u32; 3]>, Vec<u32>) = mesh
+    let known = |t: &[u32; 3]| t.iter().all(|&i| (i as usize) < mesh.vertices.len());
+    let (numbers, triangles): (Vec<usize>, Vec<[u32; 3]>) = mesh
         .triangles
         .iter()
         .enumerate()
         .filter(|(_, triangle)| known(triangle))
-        .map(|(place, triangle)| (*triangle, look_of(place)))
         .unzip();
     let faces: Vec<Vector3<f32>> = triangles
         .iter()
@@ -71,45 +65,21 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
     // The shaded vertices of a place as a list: the newest, and before each the one before it.
     let mut newest = vec![NONE; mesh.vertices.len()];
     let mut before: Vec<u32> = Vec::with_capacity(mesh.vertices.len());
+    let looks = mesh.looks.iter().flat_map(|looks| looks.list.clone());
     let mut shaded = Shaded {
         vertices: Vec::with_capacity(mesh.vertices.len()),
         indices: Vec::with_capacity(3 * triangles.len()),
-        looks: mesh
-            .looks
-            .iter()
-            .flat_map(|looks| looks.list.clone())
-            .collect(),
+        looks: looks.collect(),
         coordinates: Vec::new(),
         textures: mesh.textures.clone(),
     };
-    let laid = mesh.textures.as_ref().map(|textures| {
-        let placed = textures.coordinates.iter().zip(&mesh.triangles);
-        let known = placed.filter(|(_, triangle)| known(triangle));
-        (
-            textures,
-            known.map(|(corners, _)| *corners).collect::<Vec<_>>(),
-        )
-    });
-    for (number, ((triangle, own), look)) in triangles.iter().zip(&faces).zip(looks).enumerate() {
-        let corners = laid.as_ref().map(|(textures, corners)| {
-            let corners = corners.get(number).copied().unwrap_or_default();
-            textures.of_look(look).map_or([[0.0; 2]; 3], |_| corners)
-        });
+    for ((number, triangle), own) in numbers.into_iter().zip(&triangles).zip(&faces) {
+        let look = look_of(mesh, number);
+        let corners = coordinates_of(mesh, number, look);
         for (corner, &vertex) in triangle.iter().enumerate() {
             let laid = corners.map(|corners| corners[corner]);
             let place = welded[vertex as usize];
-            let sum = around
-                .faces(place)
-                .iter()
-                .filter(|(face, _)| faces[*face as usize].dot(own) >= smooth)
-                .map(|(face, weight)| faces[*face as usize] * *weight)
-                .sum::<Vector3<f32>>();
-            let normal: [f32; 3] = if sum.norm_squared() > 0.0 {
-                direction(sum)
-            } else {
-                *own
-            }
-            .into();
+            let normal: [f32; 3] = around.normal(place, &faces, own, smooth).into();
             let mut index = newest[place as usize];
             let differs = |index: u32| {
                 let (_, other, of) = shaded.vertices[index as usize];
@@ -130,6 +100,21 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
         }
     }
     shaded
+}
+
+/// Of the triangle with this number, as in [`Shaded::vertices`].
+fn look_of(mesh: &TriangleMesh, number: usize) -> u32 {
+    let looks = mesh.looks.as_ref();
+    let place = looks.and_then(|looks| looks.of_triangles.get(number));
+    place.map_or(NO_LOOK, |place| u32::from(*place))
+}
+
+/// Of the triangle's corners, in the texture of its `look`; `None` where no look has one.
+fn coordinates_of(mesh: &TriangleMesh, number: usize, look: u32) -> Option<[[f32; 2]; 3]> {
+    let textures = mesh.textures.as_ref()?;
+    let textured = textures.of_look(look).is_some();
+    let corners = textures.coordinates.get(number).filter(|_| textured);
+    Some(corners.copied().unwrap_or_default())
 }
 
 impl Shaded {
@@ -196,9 +181,26 @@ impl Around {
         Self { starts, faces }
     }
 
-    fn faces(&self, place: u32) -> &[(u32, f32)] {
+    /// Of the faces at a place that turn away from `own` by no more than the angle whose cosine is `smooth`.
+    fn normal(
+        &self,
+        place: u32,
+        faces: &[Vector3<f32>],
+        own: &Vector3<f32>,
+        smooth: f32,
+    ) -> Vector3<f32> {
         let place = place as usize;
-        &self.faces[self.starts[place] as usize..self.starts[place + 1] as usize]
+        let here = &self.faces[self.starts[place] as usize..self.starts[place + 1] as usize];
+        let sum = here
+            .iter()
+            .filter(|(face, _)| faces[*face as usize].dot(own) >= smooth)
+            .map(|(face, weight)| faces[*face as usize] * *weight)
+            .sum::<Vector3<f32>>();
+        if sum.norm_squared() > 0.0 {
+            direction(sum)
+        } else {
+            *own
+        }
     }
 }
 

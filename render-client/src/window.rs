@@ -6,6 +6,7 @@
 
 mod display;
 mod light;
+mod opened;
 mod shown;
 pub(crate) mod still;
 
@@ -70,7 +71,7 @@ pub(crate) fn run(
     plan: Plan,
     hand: Option<Hand>,
 ) -> Result<(Ended, DrawnWith), RenderError> {
-    let no_display = |error: winit::error::EventLoopError| display::missing(&error);
+    let no_display = |error: winit::error::EventLoopError| opened::missing(&error);
     let events = EventLoop::new().map_err(no_display)?;
     let mut app = App {
         session,

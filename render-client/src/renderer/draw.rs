@@ -90,6 +90,22 @@ struct Plan {
     ghost: Option<Batch>,
 }
 
+impl Plan {
+    /// Of no state.
+    fn empty(light: KeyLight) -> Self {
+        Self {
+            light,
+            stale: true,
+            reflections: true,
+            casters: Vec::new(),
+            moving: 0,
+            translucent: Vec::new(),
+            marks: Vec::new(),
+            ghost: None,
+        }
+    }
+}
+
 impl Renderer {
     /// Brings the stage's meshes to the graphics card, for pictures of `format`.
     pub fn new(gpu: &Gpu, stage: &Stage, format: wgpu::TextureFormat) -> Self {
@@ -153,16 +169,7 @@ impl Renderer {
             shadowed: None,
             shadow_passes: 0,
             triangles: AtomicU64::new(0),
-            plan: Plan {
-                light: KeyLight::fit(&nearest, &bodies, ShadowMap::TEXELS),
-                stale: true,
-                reflections: true,
-                casters: Vec::new(),
-                moving: 0,
-                translucent: Vec::new(),
-                marks: Vec::new(),
-                ghost: None,
-            },
+            plan: Plan::empty(KeyLight::fit(&nearest, &bodies, ShadowMap::TEXELS)),
         }
     }
 

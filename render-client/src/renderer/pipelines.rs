@@ -82,36 +82,8 @@ impl Pipelines {
             ..background
         };
         let pipeline = |parts| layout.pipeline(device, output, parts);
-        let textured = texture.map(|texture| {
-            let [vertices, instances] = buffer_layouts();
-            let buffers = [vertices, instances, coordinate_layout()];
-            let pictured = shaders(
-                "textured",
-                concat!(
-                    include_str!("../../shaders/mesh.wgsl"),
-                    include_str!("../../shaders/textured.wgsl")
-                ),
-            );
-            let mesh = PipelineParts {
-                label: "textured",
-                shaders: &pictured,
-                vertex: "pictured",
-                fragment: if fades { "textured_fading" } else { "textured" },
-                own: Some(texture),
-                buffers: &buffers,
-                ..mesh
-            };
-            let translucent = PipelineParts {
-                label: "textured translucent",
-                fragment: "textured_translucent",
-                layer: Layer::Translucent,
-                ..mesh
-            };
-            TexturedPipelines {
-                mesh: layout.pipeline(device, output, &mesh),
-                translucent: layout.pipeline(device, output, &translucent),
-            }
-        });
+        let textured = texture
+            .map(|texture| TexturedPipelines::new(device, layout, output, fades, texture, &mesh));
         Self {
             textured,
             background: pipeline(&background),
@@ -119,6 +91,44 @@ impl Pipelines {
             mesh: pipeline(&mesh),
             translucent: pipeline(&translucent),
             ghost: pipeline(&ghost),
+        }
+    }
+}
+
+impl TexturedPipelines {
+    /// As `plain` bodies are drawn, with a `texture`.
+    fn new(
+        device: &wgpu::Device,
+        layout: &FrameLayout,
+        output: Output,
+        fades: bool,
+        texture: &wgpu::BindGroupLayout,
+        plain: &PipelineParts<'_>,
+    ) -> Self {
+        let [vertices, instances] = buffer_layouts();
+        let buffers = [vertices, instances, coordinate_layout()];
+        let source = concat!(
+            include_str!("../../shaders/mesh.wgsl"),
+            include_str!("../../shaders/textured.wgsl")
+        );
+        let mesh = PipelineParts {
+            label: "textured",
+            shaders: &layout.shaders(device, output, "textured", source),
+            vertex: "pictured",
+            fragment: if fades { "textured_fading" } else { "textured" },
+            own: Some(texture),
+            buffers: &buffers,
+            ..*plain
+        };
+        let translucent = PipelineParts {
+            label: "textured translucent",
+            fragment: "textured_translucent",
+            layer: Layer::Translucent,
+            ..mesh
+        };
+        Self {
+            mesh: layout.pipeline(device, output, &mesh),
+            translucent: layout.pipeline(device, output, &translucent),
         }
     }
 }

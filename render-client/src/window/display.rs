@@ -3,16 +3,16 @@
 use std::sync::Arc;
 
 use wgpu::CurrentSurfaceTexture;
-use winit::dpi::{PhysicalPosition, PhysicalSize};
+use winit::dpi::PhysicalSize;
 use winit::event_loop::ActiveEventLoop;
-use winit::monitor::MonitorHandle;
-use winit::window::{Fullscreen, Window, WindowId};
+use winit::window::{Window, WindowId};
 
 use super::Plan;
 use super::light::{Light, NoFeedback};
+use super::opened::open_windows;
 use crate::canvas::target_of;
 use crate::error::RenderError;
-use crate::monitor::{self, Places};
+use crate::monitor::Places;
 use crate::mouse;
 use crate::renderer::{Gpu, OffScreen, PictureTarget, Renderer, new_instance};
 use crate::snapshot::{Frame, Part};
@@ -69,63 +69,34 @@ impl Display {
             String::new()
         };
         let instance = new_instance(Some(events.owned_display_handle()));
-        let monitors: Vec<MonitorHandle> = events.available_monitors().collect();
-        let names: Vec<Option<String>> = monitors.iter().map(MonitorHandle::name).collect();
-        let mut opened = Vec::new();
-        let mut columns = monitor::Columns::default();
-        for (index, screen) in stage.screens.iter().enumerate() {
-            for (eye, picture) in Picture::of(screen.stereo).into_iter().enumerate() {
-                let (width, height) = screen.pixels;
-                let place = monitor::of_window(opened.len(), &places.monitors, &names)?;
-                let monitor = place.and_then(|place| monitors.get(place).cloned());
-                // A monitor that was asked for is where the window opens, even if it does not cover it.
-                let named = place.filter(|_| !places.monitors.is_empty());
-                let corner = named
-                    .and_then(|place| monitors.get(place))
-                    .map_or(PhysicalPosition::new(0, 0), MonitorHandle::position);
-                let below = columns.next(named, height);
-                let cover = || Fullscreen::Borderless(monitor.clone());
-                let attributes = Window::default_attributes()
-                    .with_title(format!("taut: {}{}{help}", screen.name, picture.suffix))
-                    .with_inner_size(PhysicalSize::new(width, height))
-                    .with_position(PhysicalPosition::new(corner.x, corner.y + below as i32))
-                    .with_fullscreen(places.fullscreen.then(cover));
-                let window = events
-                    .create_window(attributes)
-                    .map_err(|error| missing(&error))?;
-                let window = Arc::new(window);
-                let surface = instance
-                    .create_surface(Arc::clone(&window))
-                    .map_err(|error| missing(&error))?;
-                opened.push(((index, eye), picture, window, surface));
-            }
-        }
+        let opened = open_windows(events, &instance, stage, places, &help)?;
         let gpu = Gpu::open_for(
             instance,
-            opened.first().map(|(.., surface)| surface),
+            opened.first().map(|opened| &opened.surface),
             &plan.gpu,
         )?
         .smoothed(plan.samples, false);
         check_masks(stage, gpu.longest_side())?;
         let mut renderer: Option<Renderer> = None;
         let mut panes = Vec::new();
-        for ((screen, place), picture, window, surface) in opened {
-            let size = window.inner_size();
-            let (config, format) = configuration(&gpu, &surface, size, panes.len())?;
-            surface.configure(&gpu.device, &config);
+        for opened in opened {
+            let size = opened.window.inner_size();
+            let (config, format) = configuration(&gpu, &opened.surface, size, panes.len())?;
+            opened.surface.configure(&gpu.device, &config);
             let renderer = renderer.get_or_insert_with(|| Renderer::new(&gpu, stage, format));
             let size = (config.width, config.height);
-            let drawn = &stage.screens[screen];
-            let target = target_of(&gpu, renderer, drawn, (place, &picture), size);
+            let drawn = &stage.screens[opened.screen];
+            let picture = (opened.place, &opened.picture);
+            let target = target_of(&gpu, renderer, drawn, picture, size);
             panes.push(Pane {
-                window,
-                surface,
+                window: opened.window,
+                surface: opened.surface,
                 config,
                 format,
-                picture,
-                place,
+                picture: opened.picture,
+                place: opened.place,
                 target,
-                screen,
+                screen: opened.screen,
             });
         }
         let renderer = renderer.ok_or_else(|| RenderError::BadScene {
@@ -266,24 +237,6 @@ fn acquire(
     }
 }
 
-/// No window, by what the window system said.
-pub(super) fn missing(error: &dyn std::fmt::Display) -> RenderError {
-    RenderError::NoDisplay {
-        reason: without_place(&error.to_string()).to_owned(),
-    }
-}
-
-/// An error's text without the place in winit's source that it may begin with, `os error at FILE.rs:LINE: `, and without its full stop.
-fn without_place(text: &str) -> &str {
-    let after =
-        |(_, rest): (&str, &str)| rest.find(": ").map(|at| at + 2 + text.len() - rest.len());
-    let begins = text
-        .strip_prefix("os error at ")
-        .and_then(|place| place.split_once(".rs:"))
-        .and_then(after);
-    text[begins.unwrap_or(0)..].trim_end_matches('.')
-}
-
 /// How the window at a place among those of the node shows its pictures, of the ways that its surface offers: never torn.
 ///
 /// The first window waits for its monitor. On monitors that are out of step the others would wait again: they show the newest picture at their
@@ -367,12 +320,5 @@ mod tests {
         let late = Next::of(CurrentSurfaceTexture::Timeout);
         assert!(matches!(late, Some(Next::Busy)));
         assert!(Next::of(CurrentSurfaceTexture::Validation).is_none());
-    }
-
-    #[test]
-    fn what_the_window_system_says_is_told_without_a_place_in_its_source() {
-        let told = "os error at /home/a/winit-0.30.13/src/mod.rs:765: neither DISPLAY nor another: is set.";
-        assert_eq!(without_place(told), "neither DISPLAY nor another: is set");
-        assert_eq!(without_place("it is gone"), "it is gone");
     }
 }

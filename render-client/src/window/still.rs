@@ -9,7 +9,8 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::WindowId;
 
-use super::display::{self, Display, Next};
+use super::display::{Display, Next};
+use super::opened;
 use super::{Plan, toggle_fullscreen};
 use crate::calibrate::CalibrationWindows;
 use crate::canvas::eyes_of;
@@ -25,7 +26,7 @@ pub(crate) fn show(
     node: &str,
     windows: &CalibrationWindows,
 ) -> Result<(), RenderError> {
-    let no_display = |error: winit::error::EventLoopError| display::missing(&error);
+    let no_display = |error: winit::error::EventLoopError| opened::missing(&error);
     let events = EventLoop::new().map_err(no_display)?;
     let mut app = Still {
         stage: stage.clone(),

@@ -17,13 +17,45 @@ impl Renderer {
         self.take_levels(gpu, |levels| levels.try_recv().ok());
         let state = &latched.state;
         let mut list = InstanceList::default();
+        let bodies = self.bodies(stage, state, &mut list);
+        let marks = self.marks(stage, state, show, &bodies, &mut list);
+        let ghost = show.ghost.then(|| {
+            let body = &stage.god_object;
+            let own = self.bounds(stage, body, &state.device);
+            let instance = ghost::instance(stage, &state.device);
+            let scale = body.scale * stage.workbench_from_scene.scaling();
+            list.batch(body.mesh, [instance], own, scale)
+        });
+
+        self.plan = Plan {
+            light: KeyLight::fit(&bodies.bounds, &bodies.all, ShadowMap::TEXELS),
+            stale: latched.stale,
+            reflections: show.reflections,
+            casters: bodies.casters,
+            moving: bodies.moving,
+            translucent: bodies.translucent,
+            marks,
+            ghost,
+        };
+        gpu.queue
+            .write_buffer(&self.instances, 0, bytemuck::cast_slice(&list.instances));
+        let (held, standing) = self.plan.casters.split_at(bodies.moving);
+        let shadowed = Shadowed {
+            light: self.plan.light,
+            moving: list.of(held),
+            standing: list.of(standing),
+        };
+        self.draw_shadow(gpu, shadowed);
+    }
+
+    /// The god-object, and the obstacles that are seen: those that move come first.
+    fn bodies(&self, stage: &Stage, state: &State, list: &mut InstanceList) -> DrawnBodies {
         let (mut casters, mut translucent) = (Vec::new(), Vec::new());
-        let mut bounds = self.bounds(stage, &stage.god_object, &state.god_object);
-        let radius = bounds.radius;
+        let held = self.bounds(stage, &stage.god_object, &state.god_object);
+        let (mut bounds, mut all) = (held, held);
         let scale = stage.workbench_from_scene.scaling();
-        let meshes = &self.meshes;
         let is_opaque =
-            |body: &StageBody| body.opacity >= 1.0 && !meshes[body.mesh].is_see_through();
+            |body: &StageBody| body.opacity >= 1.0 && !self.meshes[body.mesh].is_see_through();
         let mut add = |body: &StageBody, instance, own| {
             let batch = list.batch(body.mesh, [instance], own, body.scale * scale);
             if is_opaque(body) {
@@ -33,8 +65,7 @@ impl Renderer {
             }
         };
         let god_object = god_object::instance(stage, &state.god_object);
-        add(&stage.god_object, god_object, bounds);
-        let mut all = bounds;
+        add(&stage.god_object, god_object, held);
         let mut moving = usize::from(is_opaque(&stage.god_object));
         let moves = |body: &StageBody| state.bodies.iter().any(|(id, _)| *id == body.id);
         let seen = || {
@@ -54,7 +85,26 @@ impl Renderer {
             add(body, obstacles::instance(stage, &shown, pose), own);
             moving += usize::from(is_opaque(body) && moves(body));
         }
+        DrawnBodies {
+            casters,
+            translucent,
+            moving,
+            held,
+            bounds,
+            all,
+        }
+    }
 
+    /// Contact dots and force arrow, sized by the god-object.
+    fn marks(
+        &self,
+        stage: &Stage,
+        state: &State,
+        show: Show,
+        bodies: &DrawnBodies,
+        list: &mut InstanceList,
+    ) -> Vec<Batch> {
+        let (bounds, radius) = (bodies.bounds, bodies.held.radius);
         let (dot, arrow) = (self.meshes.len() - 2, self.meshes.len() - 1);
         let mut marks = Vec::new();
         if show.contacts {
@@ -66,32 +116,7 @@ impl Renderer {
             let mark = force::instance(stage, pose, &state.force, &self.god_object_box, radius);
             marks.push(list.batch(arrow, mark, bounds, 1.0));
         }
-        let ghost = show.ghost.then(|| {
-            let body = &stage.god_object;
-            let own = self.bounds(stage, body, &state.device);
-            let instance = ghost::instance(stage, &state.device);
-            list.batch(body.mesh, [instance], own, body.scale * scale)
-        });
-
-        self.plan = Plan {
-            light: KeyLight::fit(&bounds, &all, ShadowMap::TEXELS),
-            stale: latched.stale,
-            reflections: show.reflections,
-            casters,
-            moving,
-            translucent,
-            marks,
-            ghost,
-        };
-        gpu.queue
-            .write_buffer(&self.instances, 0, bytemuck::cast_slice(&list.instances));
-        let (held, standing) = self.plan.casters.split_at(moving);
-        let shadowed = Shadowed {
-            light: self.plan.light,
-            moving: list.of(held),
-            standing: list.of(standing),
-        };
-        self.draw_shadow(gpu, shadowed);
+        marks
     }
 
     /// Brings the shadow map up to date: what stands only if it or the light moved.
@@ -127,6 +152,19 @@ impl Renderer {
     fn bounds(&self, stage: &Stage, body: &StageBody, pose: &Isometry3<f64>) -> Bounds {
         stage.body_bounds(body, pose, &self.mesh_bounds[body.mesh])
     }
+}
+
+/// The bodies of one frame.
+struct DrawnBodies {
+    /// As in [`Plan`].
+    casters: Vec<Batch>,
+    translucent: Vec<Batch>,
+    moving: usize,
+    /// Around the god-object.
+    held: Bounds,
+    /// Around all that is no ground.
+    bounds: Bounds,
+    all: Bounds,
 }
 
 /// Instances of one frame, in the order of the buffer.
