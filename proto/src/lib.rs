@@ -62,6 +62,7 @@ pub mod limits;
 pub mod membership;
 pub mod mesh_blob;
 mod mesh_looks;
+mod mesh_prefix;
 pub mod mesh_textures;
 pub mod multicast;
 mod octahedral;

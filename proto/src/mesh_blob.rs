@@ -16,20 +16,14 @@
 
 use crate::codec::wire_struct;
 pub use crate::mesh_looks::{Finish, Look, Looks, MAX_LOOKS};
+use crate::mesh_prefix::{
+    LAYOUT_F64, LAYOUT_FINISH, LAYOUT_LOOKS, LAYOUT_NORMALS, LAYOUT_TEXTURES, PREFIX_BYTES, Prefix,
+};
 use crate::mesh_textures::Textures;
 use crate::{DecodeError, EncodeError};
 
 /// Most bytes of an encoded mesh: 4 million triangles.
 pub const MAX_MESH_BYTES: usize = 128 << 20;
-
-const BLOB_MAGIC: [u8; 4] = *b"tmsh";
-const PREFIX_BYTES: usize = 16;
-const LAYOUT_F64: u8 = 1;
-const LAYOUT_NORMALS: u8 = 2;
-const LAYOUT_FINISH: u8 = 4;
-const LAYOUT_LOOKS: u8 = 8;
-const LAYOUT_TEXTURES: u8 = 16;
-const FINISH_BYTES: usize = 8;
 
 wire_struct! {
     /// BLAKE3 hash of an encoded mesh.
@@ -209,35 +203,11 @@ impl MeshBlob {
 
     /// The bytes that travel and are hashed. Fails above [`MAX_MESH_BYTES`].
     pub fn encode(&self) -> Result<Vec<u8>, EncodeError> {
-        let vertices = self.positions.len();
-        let (wide, position_bytes) = match &self.positions {
-            Positions::F32(_) => (0, 12),
-            Positions::F64(_) => (LAYOUT_F64, 24),
-        };
-        let normals = if self.normals.is_some() {
-            LAYOUT_NORMALS
-        } else {
-            0
-        };
-        let normal_bytes = if self.normals.is_some() { 12 } else { 0 };
-        let (finish, finish_bytes) = match self.finish {
-            Some(_) => (LAYOUT_FINISH, FINISH_BYTES),
-            None => (0, 0),
-        };
-        let (looks, look_bytes) = match &self.looks {
-            Some(looks) => (LAYOUT_LOOKS, looks.encoded_len()),
-            None => (0, 0),
-        };
-        let (textures, texture_bytes) = match &self.textures {
-            Some(textures) => (LAYOUT_TEXTURES, textures.encoded_len()),
-            None => (0, 0),
-        };
+        let prefix = self.prefix();
         let len = PREFIX_BYTES
-            + vertices * (position_bytes + normal_bytes)
-            + self.triangles.len() * 12
-            + finish_bytes
-            + look_bytes
-            + texture_bytes;
+            + prefix.lengths().iter().sum::<u64>() as usize // all of it lies in memory
+            + self.looks.as_ref().map_or(0, Looks::encoded_len)
+            + self.textures.as_ref().map_or(0, Textures::encoded_len);
         if len > MAX_MESH_BYTES {
             return Err(EncodeError::TooLong {
                 what: "mesh",
@@ -246,10 +216,7 @@ impl MeshBlob {
             });
         }
         let mut bytes = Vec::with_capacity(len);
-        bytes.extend(BLOB_MAGIC);
-        bytes.extend([wide | normals | finish | looks | textures, 0, 0, 0]);
-        bytes.extend((vertices as u32).to_le_bytes()); // far below 2^32: see the limit above
-        bytes.extend((self.triangles.len() as u32).to_le_bytes());
+        bytes.extend(prefix.to_bytes());
         match &self.positions {
             Positions::F32(list) => list
                 .iter()
@@ -282,76 +249,54 @@ impl MeshBlob {
         Ok(bytes)
     }
 
+    fn prefix(&self) -> Prefix {
+        let parts = [
+            (matches!(self.positions, Positions::F64(_)), LAYOUT_F64),
+            (self.normals.is_some(), LAYOUT_NORMALS),
+            (self.finish.is_some(), LAYOUT_FINISH),
+            (self.looks.is_some(), LAYOUT_LOOKS),
+            (self.textures.is_some(), LAYOUT_TEXTURES),
+        ];
+        let present = parts.iter().filter(|(is_there, _)| *is_there);
+        Prefix {
+            layout: present.fold(0, |layout, (_, part)| layout | part),
+            vertices: self.positions.len() as u64,
+            triangles: self.triangles.len() as u64,
+        }
+    }
+
     /// Reads what [`MeshBlob::encode`] wrote. Memory is bounded by the length of `bytes`, whatever its counts claim.
     pub fn decode(bytes: &[u8]) -> Result<MeshBlob, DecodeError> {
-        let Some((prefix, body)) = bytes.split_first_chunk::<PREFIX_BYTES>() else {
-            return Err(DecodeError::Truncated);
-        };
-        let [
-            m0,
-            m1,
-            m2,
-            m3,
-            layout,
-            r0,
-            r1,
-            r2,
-            v0,
-            v1,
-            v2,
-            v3,
-            t0,
-            t1,
-            t2,
-            t3,
-        ] = *prefix;
-        if [m0, m1, m2, m3] != BLOB_MAGIC {
-            return Err(DecodeError::WrongMagic);
-        }
-        let known = LAYOUT_F64 | LAYOUT_NORMALS | LAYOUT_FINISH | LAYOUT_LOOKS | LAYOUT_TEXTURES;
-        let has = |part: u8| layout & part != 0;
-        let unknown = layout & !known != 0 || has(LAYOUT_TEXTURES) && !has(LAYOUT_LOOKS);
-        if unknown || [r0, r1, r2] != [0; 3] {
-            return Err(DecodeError::UnknownTag {
-                what: "mesh layout",
-                tag: layout,
-            });
-        }
-        let vertices = u64::from(u32::from_le_bytes([v0, v1, v2, v3]));
-        let triangles = u64::from(u32::from_le_bytes([t0, t1, t2, t3]));
-        let wide = has(LAYOUT_F64);
-        let with_normals = has(LAYOUT_NORMALS);
-        let with_finish = has(LAYOUT_FINISH);
-
+        let (prefix, body) = Prefix::read(bytes)?;
         // The counts must account for every byte before anything is read.
-        let position_len = vertices * if wide { 24 } else { 12 };
-        let triangle_len = triangles * 12;
-        let normal_len = if with_normals { vertices * 12 } else { 0 };
-        let finish_len = if with_finish { FINISH_BYTES as u64 } else { 0 };
-        let before_looks = position_len + triangle_len + normal_len + finish_len;
+        let lengths = prefix.lengths();
+        let before_looks = lengths.iter().sum::<u64>();
         let looks_start = usize::try_from(before_looks).unwrap_or(usize::MAX);
         let (body, looks) = match body.split_at_checked(looks_start) {
-            Some((body, looks)) if has(LAYOUT_LOOKS) != looks.is_empty() => (body, looks),
+            Some((body, looks)) if prefix.has(LAYOUT_LOOKS) != looks.is_empty() => (body, looks),
             _ => {
                 return Err(DecodeError::Inconsistent {
                     what: "mesh length",
                 });
             }
         };
-        let (positions, rest) = body.split_at(position_len as usize);
-        let (triangles, rest) = rest.split_at(triangle_len as usize);
-        let (normals, finish) = rest.split_at(normal_len as usize);
+        let [positions, triangles, normals, _] = lengths.map(|length| length as usize);
+        let (positions, rest) = body.split_at(positions);
+        let (triangles, rest) = rest.split_at(triangles);
+        let (normals, finish) = rest.split_at(normals);
         let mut mesh = MeshBlob::new(
-            if wide {
+            if prefix.has(LAYOUT_F64) {
                 Positions::F64(triples(positions, f64::from_le_bytes))
             } else {
                 Positions::F32(triples(positions, f32::from_le_bytes))
             },
             triples(triangles, u32::from_le_bytes),
-            with_normals.then(|| triples(normals, f32::from_le_bytes)),
+            prefix
+                .has(LAYOUT_NORMALS)
+                .then(|| triples(normals, f32::from_le_bytes)),
         )?;
         // Where there are none, the bytes are none: the lengths above agree.
-        if let Ok([a, b, c, d, e, f, g, h]) = <[u8; FINISH_BYTES]>::try_from(finish) {
+        if let Ok([a, b, c, d, e, f, g, h]) = <[u8; 8]>::try_from(finish) {
             mesh = mesh.with_finish(Finish {
                 roughness: f32::from_le_bytes([a, b, c, d]),
                 metallic: f32::from_le_bytes([e, f, g, h]),
@@ -363,7 +308,7 @@ impl MeshBlob {
         let (looks, textures) = Looks::read(looks, mesh.triangles.len())?;
         let count = looks.list.len();
         let mesh = mesh.with_looks(looks)?;
-        match (has(LAYOUT_TEXTURES), textures) {
+        match (prefix.has(LAYOUT_TEXTURES), textures) {
             (false, []) => Ok(mesh),
             (false, _) => Err(DecodeError::Inconsistent {
                 what: "mesh length",

@@ -442,22 +442,9 @@ impl Master {
         }
         self.drop_the_dead(now_ns);
         self.free_those_behind();
-        for &session in &late {
-            let Some(member) = self.members.iter_mut().find(|m| m.session == session) else {
-                continue;
-            };
-            let before = member.state;
-            member.pass_over();
-            if member.state != before {
-                self.tell(session, Some(NodeState::Late));
-            }
-        }
+        self.pass_over(&late);
 
-        let swap_ns = match self.settings.swap {
-            Swap::Scheduled if self.members.iter().any(Member::has_no_clock) => 0,
-            Swap::Immediate => 0,
-            Swap::Scheduled => self.due_ns.max(now_ns + LEAD_NS),
-        };
+        let swap_ns = self.swap_time_ns(now_ns);
         self.in_step = self.members.iter().any(Member::is_waited_for);
         let period_ns = self.period_ns();
         self.last_deadline_ns = deadline_ns;
@@ -525,6 +512,29 @@ impl Master {
         for session in freed {
             self.counts.freed += 1;
             self.tell(session, Some(NodeState::FreeRunning));
+        }
+    }
+
+    /// Notes that these nodes were not there in time; some may be out meanwhile.
+    fn pass_over(&mut self, late: &[u16]) {
+        for &session in late {
+            let Some(member) = self.members.iter_mut().find(|m| m.session == session) else {
+                continue;
+            };
+            let before = member.state;
+            member.pass_over();
+            if member.state != before {
+                self.tell(session, Some(NodeState::Late));
+            }
+        }
+    }
+
+    /// When the frame that is released now is swapped; 0 is at once.
+    fn swap_time_ns(&self, now_ns: u64) -> u64 {
+        match self.settings.swap {
+            Swap::Scheduled if self.members.iter().any(Member::has_no_clock) => 0,
+            Swap::Immediate => 0,
+            Swap::Scheduled => self.due_ns.max(now_ns + LEAD_NS),
         }
     }
 

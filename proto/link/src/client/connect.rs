@@ -58,26 +58,7 @@ pub(crate) async fn connect_with(
 ) -> Result<ClientLink, LinkError> {
     // Nobody is asked for what the key does not allow.
     options.key.secret_for(options.role, &options.node)?;
-    let deadline = Instant::now() + options.connect_timeout;
-    let unreachable = || LinkError::Unreachable {
-        server: options.server.clone(),
-        seconds: options.connect_timeout.as_secs_f64(),
-    };
-    let addresses = timeout_at(deadline, resolve(&options.server))
-        .await
-        .map_err(|_| unreachable())??;
-    let turned_away = AtomicBool::new(false);
-    let joining = timeout_at(deadline, get_in(&options, &addresses, &turned_away));
-    let (endpoint, connection, joined) =
-        joining
-            .await
-            .map_err(|_| match turned_away.load(Ordering::Relaxed) {
-                true => LinkError::TurnedAway {
-                    server: options.server.clone(),
-                    seconds: options.connect_timeout.as_secs_f64(),
-                },
-                false => unreachable(),
-            })??;
+    let (endpoint, connection, joined) = get_in_in_time(&options).await?;
     let Joined {
         welcome,
         description,
@@ -131,6 +112,30 @@ pub(crate) async fn connect_with(
         pictures,
         send,
     ))
+}
+
+/// Finds the server and joins, within the time that the options give for it.
+async fn get_in_in_time(
+    options: &ClientOptions,
+) -> Result<(Endpoint, Connection, Joined), LinkError> {
+    let deadline = Instant::now() + options.connect_timeout;
+    let unreachable = || LinkError::Unreachable {
+        server: options.server.clone(),
+        seconds: options.connect_timeout.as_secs_f64(),
+    };
+    let addresses = timeout_at(deadline, resolve(&options.server))
+        .await
+        .map_err(|_| unreachable())??;
+    let turned_away = AtomicBool::new(false);
+    timeout_at(deadline, get_in(options, &addresses, &turned_away))
+        .await
+        .map_err(|_| match turned_away.load(Ordering::Relaxed) {
+            true => LinkError::TurnedAway {
+                server: options.server.clone(),
+                seconds: options.connect_timeout.as_secs_f64(),
+            },
+            false => unreachable(),
+        })?
 }
 
 /// Addresses of `host:port`, IPv4 first; without a port, the default one.

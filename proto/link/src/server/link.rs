@@ -12,6 +12,7 @@ use super::{
     group::{self, GroupHub},
     head_input::head_inputs,
     joining::MAX_JOINING,
+    listening::{Listening, freed, listen, system},
     places::Places,
     quic_outbox::{self, QuicSender},
     receive,
@@ -23,12 +24,10 @@ use crate::{
     counters::CounterCells,
     framing::{CLOSE_CHANGING, CLOSE_STOPPING},
     lock::{Mutex, lock},
-    transport,
 };
 use ring::rand::{SecureRandom, SystemRandom};
 use std::{
-    io,
-    net::{SocketAddr, UdpSocket},
+    net::SocketAddr,
     sync::{
         Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
@@ -39,14 +38,12 @@ use std::{
 };
 use taut_proto::membership::{Pace, SilenceLimits};
 use taut_proto::{JoinPolicy, ServerPin, range::MAX_TIMEOUT_MS, waiting::Waiting};
-use tokio::time::{sleep, timeout};
+use tokio::time::timeout;
 
 /// Events kept for who takes them; more are dropped and counted.
 const MAX_EVENTS: usize = 1024;
 /// Time for the clients to hear that the server stops.
 const STOP_TIMEOUT: Duration = Duration::from_millis(500);
-/// How often a stopped server looks whether its port is free.
-const FREE_CHECK: Duration = Duration::from_millis(1);
 
 /// What a thread of the network does until the server stops.
 type ThreadBody = fn(&Arc<Shared>);
@@ -79,26 +76,13 @@ fn told_node_timeout(timeout: Duration) -> Result<u32, LinkError> {
 /// Fails if an address cannot be had, if `node_timeout` is none that clients can be told, or if `content` names a mesh that it does not hold; nothing is left running then.
 pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLink, LinkError> {
     let node_timeout_ms = told_node_timeout(options.node_timeout)?;
-    let content = content.encode(options.coupling)?;
-    let quic_socket = listen(options.quic, "control")?;
-    let udp = listen(options.udp, "state")?;
-    let address_of = |socket: &UdpSocket| {
-        socket
-            .local_addr()
-            .map_err(|error| system("read a socket's address", &error))
-    };
-    let (quic_address, udp_address) = (address_of(&quic_socket)?, address_of(&udp)?);
-    let endpoint = quinn::Endpoint::new(
-        quinn::EndpointConfig::default(),
-        Some(transport::server_config(
-            &options.key,
-            options.also.as_ref(),
-            options.idle_timeout,
-        )?),
-        quic_socket,
-        Arc::new(quinn::TokioRuntime),
-    )
-    .map_err(|error| system("start QUIC", &error))?;
+    let content = content.encode(options.coupling.clone())?;
+    let Listening {
+        endpoint,
+        quic_address,
+        udp,
+        udp_address,
+    } = listen(&options)?;
 
     let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
     let (input, output) = triple_buffer::triple_buffer(&None);
@@ -329,36 +313,12 @@ impl ServerLink {
     }
 }
 
-/// Waits until nobody listens at `address`: tasks hold both sockets a moment longer than the endpoint lives.
-async fn freed(address: SocketAddr) {
-    let taken =
-        || UdpSocket::bind(address).is_err_and(|error| error.kind() == io::ErrorKind::AddrInUse);
-    while taken() {
-        sleep(FREE_CHECK).await;
-    }
-}
-
 impl Drop for ServerLink {
     fn drop(&mut self) {
         self.eviction.abort();
         self.shared.stopping.store(true, Ordering::Relaxed);
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
     }
-}
-
-fn listen(address: SocketAddr, plane: &'static str) -> Result<UdpSocket, LinkError> {
-    let socket = UdpSocket::bind(address).map_err(|source| match source.kind() {
-        io::ErrorKind::AddrInUse => LinkError::PortInUse { address, plane },
-        _ => LinkError::Listen {
-            address,
-            plane,
-            source,
-        },
-    })?;
-    socket
-        .set_nonblocking(true)
-        .map_err(|error| system("make a socket non-blocking", &error))?;
-    Ok(socket)
 }
 
 /// A new incarnation has a new number, so that datagrams of an earlier one are told apart.
@@ -371,11 +331,4 @@ fn random_epoch() -> Result<u32, LinkError> {
             reason: "the system gives none".to_owned(),
         })?;
     Ok(u32::from_le_bytes(bytes))
-}
-
-fn system(what: &'static str, error: &io::Error) -> LinkError {
-    LinkError::System {
-        what,
-        reason: error.to_string(),
-    }
 }

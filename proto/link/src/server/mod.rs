@@ -17,6 +17,7 @@ mod group;
 mod head_input;
 mod joining;
 mod link;
+mod listening;
 mod options;
 mod pictures;
 mod places;
