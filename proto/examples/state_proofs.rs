@@ -37,14 +37,9 @@ fn us(mut run: impl FnMut()) -> f64 {
     times[times.len() / 2]
 }
 
-fn main() {
-    let state = [7; STATE_BYTES];
-    let hash = us(|| {
-        black_box(payload_hash(black_box(&state)));
-    });
-    let Ok(document) = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new()) else {
-        return eprintln!("the system gives no random numbers");
-    };
+/// To sign ten fingerprints, and to check the signature; `None` where the system gives no random numbers.
+fn signature_us() -> Option<(f64, f64)> {
+    let document = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new()).ok()?;
     let Ok(pair) = Ed25519KeyPair::from_pkcs8(document.as_ref()) else {
         unreachable!("made above");
     };
@@ -58,7 +53,11 @@ fn main() {
         let valid = public.verify(black_box(&digests), signature.as_ref());
         assert!(valid.is_ok());
     });
+    Some((sign, verify))
+}
 
+/// To seal a confirmation and to open one, with its length.
+fn confirmation_us() -> (f64, f64, usize) {
     let mut confirmation = Confirmation::default();
     for tick in (1..=100).rev() {
         confirmation.add(SentState {
@@ -82,49 +81,61 @@ fn main() {
         }
     });
     assert!(decode::<Confirmation>(&payload[..length]).is_ok());
+    (seal, open, length)
+}
+
+fn main() {
+    let state = [7; STATE_BYTES];
+    let hash = us(|| {
+        black_box(payload_hash(black_box(&state)));
+    });
+    let Some((sign, verify)) = signature_us() else {
+        return eprintln!("the system gives no random numbers");
+    };
+    let (seal, open, length) = confirmation_us();
 
     println!(
         "fingerprint of a state of {STATE_BYTES} bytes: {hash:.2} us; signature {sign:.1} us, check {verify:.1} us"
     );
     println!("| way | server, ms/s | each receiver, ms/s | bytes/s | believed for at most |");
     println!("| --- | --- | --- | --- | --- |");
-    let row = |way: &str, server: f64, receiver: f64, bytes: f64, latency: &str| {
-        let ms = |us: f64| us * 1e-3;
+    let hashes = STATES * hash;
+    let batches = STATES / 10.0;
+    let ways = [
+        (
+            "a signature for each state",
+            STATES * sign,
+            STATES * verify,
+            STATES * 64.0,
+            "not at all",
+        ),
+        (
+            "a signature for ten states",
+            batches * sign,
+            hashes + batches * verify,
+            batches * 64.0,
+            "10 ms and a lost batch",
+        ),
+        (
+            "hash chain, key disclosed after 50 ms",
+            hashes,
+            2.0 * hashes,
+            STATES * 48.0,
+            "50 ms and the clock's error",
+        ),
+        (
+            "confirmed to each session, for each of them",
+            EXCHANGES * seal,
+            hashes + EXCHANGES * open,
+            EXCHANGES * (length + 40) as f64,
+            "50 ms and a round trip; 250 ms where confirmations are lost",
+        ),
+    ];
+    for (way, server, receiver, bytes, latency) in ways {
         println!(
             "| {way} | {:.2} | {:.2} | {bytes:.0} | {latency} |",
-            ms(server),
-            ms(receiver)
+            server * 1e-3,
+            receiver * 1e-3
         );
-    };
-    let hashes = STATES * hash;
-    row(
-        "a signature for each state",
-        STATES * sign,
-        STATES * verify,
-        STATES * 64.0,
-        "not at all",
-    );
-    let batches = STATES / 10.0;
-    row(
-        "a signature for ten states",
-        batches * sign,
-        hashes + batches * verify,
-        batches * 64.0,
-        "10 ms and a lost batch",
-    );
-    row(
-        "hash chain, key disclosed after 50 ms",
-        hashes,
-        2.0 * hashes,
-        STATES * 48.0,
-        "50 ms and the clock's error",
-    );
-    let each = EXCHANGES * seal;
-    row(
-        "confirmed to each session, for each of them",
-        each,
-        hashes + EXCHANGES * open,
-        EXCHANGES * (length + 40) as f64,
-        "50 ms and a round trip; 250 ms where confirmations are lost",
-    );
+    }
 }

@@ -203,6 +203,54 @@ impl Screen {
             && self.plan.dies.is_none_or(|dies| now < dies)
             && !self.plan.stops.is_some_and(stopped)
     }
+
+    /// Whether it still draws; what it has drawn by now is told.
+    fn is_drawing(&mut self, now: u64) -> bool {
+        if let Some((until, frame, rank, state)) = self.drawing {
+            if now < until {
+                return true;
+            }
+            self.drawing = None;
+            self.drawn = Some((frame, rank, state));
+            self.node.drawn(
+                now,
+                Drawn {
+                    state_hash: state.hash,
+                    state_time_ns: state.time_ns,
+                    ready_ns: now,
+                    draw_us: 0,
+                },
+            );
+        }
+        false
+    }
+
+    fn take_turn(&mut self, now: u64, network: &mut Network, seen: &mut Seen) {
+        match self.node.turn(now) {
+            Turn::Free | Turn::Wait { .. } => {}
+            Turn::Draw { frame } => {
+                let (low, high) = self.plan.draw;
+                let takes = STEP * (low + network.roll(high - low));
+                let rank = self.node.newest().map_or((0, 0), ReleaseHead::rank);
+                self.drawing = Some((now + takes, frame, rank, self.tuple));
+            }
+            Turn::Swap { frame, swap_ns } if swap_ns <= now => {
+                if let Some((drawn, rank, state)) = self.drawn.take() {
+                    assert_eq!(drawn, frame);
+                    seen.states
+                        .entry((rank, frame))
+                        .or_default()
+                        .push(state.hash);
+                    seen.shown
+                        .entry(self.id)
+                        .or_default()
+                        .push((now, rank, frame));
+                }
+                self.node.swapped(now);
+            }
+            Turn::Swap { .. } => {}
+        }
+    }
 }
 
 impl World {
@@ -321,74 +369,42 @@ impl World {
             screen.succession.hear(heard);
         }
         if self.server_dies.is_some() || self.server_pauses.is_some() {
-            match screen.succession.poll(now) {
-                Successor::No => {}
-                Successor::Resign => screen.leading = None,
-                Successor::Stand { term, first } => {
-                    let mut master = Master::new(self.settings(), screen.id, term, first);
-                    let members = screen.node.newest().map(|newest| newest.members.clone());
-                    master.expect(now, &members.unwrap_or_default());
-                    screen.leading = Some(Leading {
-                        master,
-                        state: screen.tuple,
-                        sent: screen.tuple,
-                        allowed: 0,
-                        last: None,
-                        again: None,
-                    });
-                }
-            }
-            if let Some(term) = &mut screen.leading {
-                term.lead(now, network, seen);
-            }
+            self.succeed(now, screen, network, seen);
         }
-
-        if let Some((until, frame, rank, state)) = screen.drawing {
-            if now < until {
-                return;
-            }
-            screen.drawing = None;
-            screen.drawn = Some((frame, rank, state));
-            screen.node.drawn(
-                now,
-                Drawn {
-                    state_hash: state.hash,
-                    state_time_ns: state.time_ns,
-                    ready_ns: now,
-                    draw_us: 0,
-                },
-            );
+        if screen.is_drawing(now) {
+            return;
         }
-        match screen.node.turn(now) {
-            Turn::Free | Turn::Wait { .. } => {}
-            Turn::Draw { frame } => {
-                let (low, high) = screen.plan.draw;
-                let takes = STEP * (low + network.roll(high - low));
-                let rank = screen.node.newest().map_or((0, 0), ReleaseHead::rank);
-                screen.drawing = Some((now + takes, frame, rank, screen.tuple));
-            }
-            Turn::Swap { frame, swap_ns } if swap_ns <= now => {
-                if let Some((drawn, rank, state)) = screen.drawn.take() {
-                    assert_eq!(drawn, frame);
-                    seen.states
-                        .entry((rank, frame))
-                        .or_default()
-                        .push(state.hash);
-                    seen.shown
-                        .entry(screen.id)
-                        .or_default()
-                        .push((now, rank, frame));
-                }
-                screen.node.swapped(now);
-            }
-            Turn::Swap { .. } => {}
-        }
+        screen.take_turn(now, network, seen);
         if let Some(appeal) = screen.node.appeal(now) {
             network.send(now, &Packet::Arrive(screen.id, SERVER, appeal));
         }
         if let Some(message) = screen.node.message(now) {
             let master = screen.node.master();
             network.send(now, &Packet::Arrive(screen.id, master, message));
+        }
+    }
+
+    /// Stands in for the server, or resigns.
+    fn succeed(&self, now: u64, screen: &mut Screen, network: &mut Network, seen: &mut Seen) {
+        match screen.succession.poll(now) {
+            Successor::No => {}
+            Successor::Resign => screen.leading = None,
+            Successor::Stand { term, first } => {
+                let mut master = Master::new(self.settings(), screen.id, term, first);
+                let members = screen.node.newest().map(|newest| newest.members.clone());
+                master.expect(now, &members.unwrap_or_default());
+                screen.leading = Some(Leading {
+                    master,
+                    state: screen.tuple,
+                    sent: screen.tuple,
+                    allowed: 0,
+                    last: None,
+                    again: None,
+                });
+            }
+        }
+        if let Some(term) = &mut screen.leading {
+            term.lead(now, network, seen);
         }
     }
 }

@@ -22,7 +22,67 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         version: 1,
         text: "taken".into(),
     };
-    let hello = Hello {
+    let granted = Hello {
+        role: Role::Tracker,
+        grant: Grant::Node { issue: 2 },
+        ..hello()
+    };
+    let offering = Hello {
+        offers: Offers::PICTURES,
+        ..hello()
+    };
+    let hash = MeshHash { bytes: [1; 32] };
+    let wanted = MeshRequest { hash };
+    let mesh = MeshHeader { hash, length: 4096 };
+    let log = LogEvent {
+        level: LogLevel::Warning,
+        text: "software rendering".into(),
+    };
+    let bye = Bye {
+        reason: "done".into(),
+    };
+    let events = EventBatch {
+        after: 16,
+        records: hot().events.to_vec(),
+    };
+    let by = StatesBy {
+        multicast: true,
+        forged: false,
+    };
+    let asked = PictureRequest { longest_edge: 640 };
+    let none = NoPicture {
+        reason: "no frame was shown".into(),
+    };
+    let at_edge = CouplingOffer::AtEdge(coupling());
+    let at_server = CouplingOffer::AtServer {
+        reason: "a height map".into(),
+    };
+    vec![
+        ("refused", ControlMessage::Refused(refusal)),
+        ("hello", ControlMessage::Hello(hello())),
+        ("welcome", ControlMessage::Welcome(welcome())),
+        ("scene", ControlMessage::Scene(scene())),
+        ("mesh_request", ControlMessage::MeshRequest(wanted)),
+        ("mesh_header", ControlMessage::MeshHeader(mesh)),
+        ("stats", ControlMessage::Stats(stats())),
+        ("log", ControlMessage::Log(log)),
+        ("coupling_at_edge", ControlMessage::Coupling(at_edge)),
+        ("coupling_at_server", ControlMessage::Coupling(at_server)),
+        ("bye", ControlMessage::Bye(bye)),
+        ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
+        ("group", ControlMessage::Group(group())),
+        ("hello_granted", ControlMessage::Hello(granted)),
+        ("events", ControlMessage::Events(events)),
+        ("states_by", ControlMessage::StatesBy(by)),
+        ("hello_with_pictures", ControlMessage::Hello(offering)),
+        ("picture_request", ControlMessage::PictureRequest(asked)),
+        ("picture_header", ControlMessage::PictureHeader(picture())),
+        ("no_picture", ControlMessage::NoPicture(none)),
+    ]
+}
+
+fn hello() -> Hello {
+    Hello {
         versions: VersionRange::SUPPORTED,
         node: "left".into(),
         role: Role::Render,
@@ -31,17 +91,11 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         proof: [3; 32],
         grant: Grant::Master,
         offers: Offers::NONE,
-    };
-    let offering = Hello {
-        offers: Offers::PICTURES,
-        ..hello.clone()
-    };
-    let granted = Hello {
-        role: Role::Tracker,
-        grant: Grant::Node { issue: 2 },
-        ..hello.clone()
-    };
-    let welcome = Welcome {
+    }
+}
+
+fn welcome() -> Welcome {
+    Welcome {
         version: PROTOCOL_VERSION,
         proof: [4; 32],
         session: 2,
@@ -49,8 +103,11 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         udp_port: 4858,
         session_time_ns: 1_000_000_000,
         node_timeout_ms: 500,
-    };
-    let stats = ClientStats {
+    }
+}
+
+fn stats() -> ClientStats {
+    ClientStats {
         frames: 600,
         fps: 59.5,
         pose_age_ms_p50: 4.0,
@@ -68,81 +125,16 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
             tick: 1000,
             state_hash: 0x0123_4567_89ab_cdef,
         }],
-    };
-    let hash = MeshHash { bytes: [1; 32] };
-    let log = LogEvent {
-        level: LogLevel::Warning,
-        text: "software rendering".into(),
-    };
-    vec![
-        ("refused", ControlMessage::Refused(refusal)),
-        ("hello", ControlMessage::Hello(hello)),
-        ("welcome", ControlMessage::Welcome(welcome)),
-        ("scene", ControlMessage::Scene(scene())),
-        (
-            "mesh_request",
-            ControlMessage::MeshRequest(MeshRequest { hash }),
-        ),
-        (
-            "mesh_header",
-            ControlMessage::MeshHeader(MeshHeader { hash, length: 4096 }),
-        ),
-        ("stats", ControlMessage::Stats(stats)),
-        ("log", ControlMessage::Log(log)),
-        (
-            "coupling_at_edge",
-            ControlMessage::Coupling(CouplingOffer::AtEdge(coupling())),
-        ),
-        (
-            "coupling_at_server",
-            ControlMessage::Coupling(CouplingOffer::AtServer {
-                reason: "a height map".into(),
-            }),
-        ),
-        (
-            "bye",
-            ControlMessage::Bye(Bye {
-                reason: "done".into(),
-            }),
-        ),
-        ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
-        ("group", ControlMessage::Group(group())),
-        ("hello_granted", ControlMessage::Hello(granted)),
-        (
-            "events",
-            ControlMessage::Events(EventBatch {
-                after: 16,
-                records: hot().events.to_vec(),
-            }),
-        ),
-        (
-            "states_by",
-            ControlMessage::StatesBy(StatesBy {
-                multicast: true,
-                forged: false,
-            }),
-        ),
-        ("hello_with_pictures", ControlMessage::Hello(offering)),
-        (
-            "picture_request",
-            ControlMessage::PictureRequest(PictureRequest { longest_edge: 640 }),
-        ),
-        (
-            "picture_header",
-            ControlMessage::PictureHeader(PictureHeader {
-                screen: "wall-left".into(),
-                shown_ns: 2_000_000_000,
-                width: 640,
-                height: 360,
-                length: 70_000,
-                more: true,
-            }),
-        ),
-        (
-            "no_picture",
-            ControlMessage::NoPicture(NoPicture {
-                reason: "no frame was shown".into(),
-            }),
-        ),
-    ]
+    }
+}
+
+fn picture() -> PictureHeader {
+    PictureHeader {
+        screen: "wall-left".into(),
+        shown_ns: 2_000_000_000,
+        width: 640,
+        height: 360,
+        length: 70_000,
+        more: true,
+    }
 }

@@ -93,23 +93,20 @@ fn any_output() -> impl Strategy<Value = OutputDescription> {
     )
 }
 
-pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
-    let body = || {
-        (
-            ".{0,20}",
-            any::<[u8; 32]>(),
-            pose64(),
-            prop::array::uniform4(0.0..=1.0_f32),
-        )
-            .prop_map(|(name, bytes, pose, colour)| BodyDescription {
-                name: name.into(),
-                mesh: MeshHash { bytes },
-                pose,
-                colour,
-            })
-    };
+fn any_body() -> impl Strategy<Value = BodyDescription> {
+    let colour = prop::array::uniform4(0.0..=1.0_f32);
+    let parts = (".{0,20}", any::<[u8; 32]>(), pose64(), colour);
+    parts.prop_map(|(name, bytes, pose, colour)| BodyDescription {
+        name: name.into(),
+        mesh: MeshHash { bytes },
+        pose,
+        colour,
+    })
+}
+
+fn any_screen() -> impl Strategy<Value = ScreenDescription> {
     let corner = || prop::array::uniform3(finite64());
-    let screen = (".{0,20}", corner(), corner(), corner(), any_output()).prop_map(
+    (".{0,20}", corner(), corner(), corner(), any_output()).prop_map(
         |(name, lower_left, lower_right, upper_left, output)| ScreenDescription {
             name: name.into(),
             lower_left,
@@ -117,7 +114,10 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
             upper_left,
             output,
         },
-    );
+    )
+}
+
+fn any_node() -> impl Strategy<Value = NodeDescription> {
     let stereo = prop::sample::select(vec![
         Stereo::Mono,
         Stereo::SideBySide,
@@ -125,37 +125,38 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
         Stereo::Anaglyph,
         Stereo::TwoWindows,
     ]);
-    let node = (
-        ".{0,20}",
-        prop::collection::vec(".{0,9}", 0..4),
-        stereo,
-        (0..=65_536_u32, 0..=65_536_u32, any::<bool>()),
-        prop::collection::vec(".{0,9}", 0..3),
+    let window =
+        (0..=65_536_u32, 0..=65_536_u32, any::<bool>()).prop_map(|(width, height, fullscreen)| {
+            WindowDescription {
+                width,
+                height,
+                fullscreen,
+            }
+        });
+    let names = |most| prop::collection::vec(".{0,9}", 0..most);
+    (".{0,20}", names(4), stereo, window, names(3)).prop_map(
+        |(name, screens, stereo, window, monitors)| NodeDescription {
+            name: name.into(),
+            screens: screens.into_iter().map(Untrusted::from).collect(),
+            stereo,
+            window,
+            monitors: monitors.into_iter().map(Untrusted::from).collect(),
+        },
     )
-        .prop_map(
-            |(name, screens, stereo, (width, height, fullscreen), monitors)| NodeDescription {
-                name: name.into(),
-                screens: screens.into_iter().map(Untrusted::from).collect(),
-                stereo,
-                window: WindowDescription {
-                    width,
-                    height,
-                    fullscreen,
-                },
-                monitors: monitors.into_iter().map(Untrusted::from).collect(),
-            },
-        );
+}
+
+pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
     let lists = (
-        prop::collection::vec(body(), 0..5),
-        prop::collection::vec(screen, 0..4),
-        prop::collection::vec(node, 0..4),
+        prop::collection::vec(any_body(), 0..5),
+        prop::collection::vec(any_screen(), 0..4),
+        prop::collection::vec(any_node(), 0..4),
     );
     let numbers = (
         prop::array::uniform6(1e-9..=1.0_f64),
         prop::array::uniform3(finite64()),
         any::<(u32, [bool; 5], Option<[u8; 32]>)>(),
     );
-    (".{0,40}", body(), lists, (pose64(), pose64()), numbers).prop_map(
+    (".{0,40}", any_body(), lists, (pose64(), pose64()), numbers).prop_map(
         |(
             name,
             god_object,
