@@ -420,6 +420,23 @@ fn answer_of(position: &Vector3<f64>, turn: &UnitQuaternion<f64>) -> String {
     )
 }
 
+/// The answer lost, cut off, with another bit, without some bytes, or the one `before` in its place.
+fn damage(answer: &str, before: &str, dice: &mut Dice) -> Option<String> {
+    let mut bytes = answer.as_bytes().to_vec();
+    let at = dice.roll(bytes.len() as u64) as usize;
+    match dice.roll(5) {
+        0 => return None,
+        1 => return Some(before.to_owned()),
+        2 => bytes.truncate(at),
+        3 => bytes[at] ^= 1 << dice.roll(8),
+        _ => {
+            let to = (at + 1 + dice.roll(40) as usize).min(bytes.len());
+            bytes.drain(at..to);
+        }
+    }
+    String::from_utf8(bytes).ok()
+}
+
 /// Loses, holds back, cuts and changes one answer in twenty: how many were damaged, and of these believed.
 fn damaged_frames(frames: u64) -> (u64, u64) {
     let (wire, held) = wired(true);
@@ -436,29 +453,12 @@ fn damaged_frames(frames: u64) -> (u64, u64) {
         let (position, turn) = smooth(now.as_secs_f64());
         let answer = answer_of(&position, &turn);
         let is_damaged = frame > 1 && dice.roll(20) == 0;
-        let mut heard = Some(answer.clone());
-        if is_damaged {
-            damaged += 1;
-            let mut bytes = answer.clone().into_bytes();
-            let at = dice.roll(bytes.len() as u64) as usize;
-            heard = match dice.roll(5) {
-                0 => None,
-                1 => Some(last.clone()),
-                2 => {
-                    bytes.truncate(at);
-                    String::from_utf8(bytes).ok()
-                }
-                3 => {
-                    bytes[at] ^= 1 << dice.roll(8);
-                    String::from_utf8(bytes).ok()
-                }
-                _ => {
-                    let to = (at + 1 + dice.roll(40) as usize).min(bytes.len());
-                    bytes.drain(at..to);
-                    String::from_utf8(bytes).ok()
-                }
-            };
-        }
+        damaged += u64::from(is_damaged);
+        let heard = if is_damaged {
+            damage(&answer, &last, &mut dice)
+        } else {
+            Some(answer.clone())
+        };
         last = answer;
         wire.with(|ends| {
             if let Some(heard) = heard {

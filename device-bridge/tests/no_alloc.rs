@@ -122,14 +122,13 @@ fn a_remote_device_does_not_allocate() {
     });
 }
 
-#[test]
-fn coupling_at_the_edge_does_not_allocate() {
+fn offer() -> EdgeCoupling {
     let surface = |friction| EdgeSurface {
         pose: PoseF64::IDENTITY,
         friction,
         sine: None,
     };
-    let offer = EdgeCoupling {
+    EdgeCoupling {
         mass: 1.0,
         inertia: [1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3],
         reference_point: [0.0; 3],
@@ -162,10 +161,12 @@ fn coupling_at_the_edge_does_not_allocate() {
         },
         set_rate_hz: 1000.0,
         obstacles: vec![surface(0.0), surface(0.3)],
-    };
-    let mut coupler = EdgeCoupler::new(&offer).expect("an offer");
-    // Rows come and go, up to the capacity; half of them are rough.
-    let sets: Vec<ConstraintSet> = (0..200_u16)
+    }
+}
+
+/// Rows come and go, up to the capacity; half of them are rough.
+fn sets() -> Vec<ConstraintSet> {
+    (0..200_u16)
         .map(|k| {
             let mut set = ConstraintSet::new();
             set.head.sequence = u64::from(k);
@@ -179,7 +180,13 @@ fn coupling_at_the_edge_does_not_allocate() {
             set.rows.sort_by_key(|row| row.obstacle);
             set
         })
-        .collect();
+        .collect()
+}
+
+#[test]
+fn coupling_at_the_edge_does_not_allocate() {
+    let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
+    let sets = sets();
     let mut forces = 0;
     assert_no_alloc(|| {
         for (tick, set) in (0..).zip(&sets) {
