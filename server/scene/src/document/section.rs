@@ -104,6 +104,11 @@ impl<'a> Section<'a> {
             .map(|(_, node)| node)
     }
 
+    /// Where `key` is, or where the table begins.
+    pub(crate) fn at_key(&self, key: &'static str) -> &'a At {
+        self.get(key).map_or(self.at, |node| &node.at)
+    }
+
     /// Whether `key` is there.
     pub(crate) fn has(&self, key: &'static str) -> bool {
         self.get(key).is_some()

@@ -250,7 +250,7 @@ impl Scene {
 pub(super) fn object_name(section: &Section<'_>, example: &str) -> Option<String> {
     let name = section.required_text("name", example)?;
     let complain = |why: &str| {
-        let at = section.get("name").map_or(section.at(), |node| &node.at);
+        let at = section.at_key("name");
         let text = format!(
             "the name {name:?} in {} {why}; write another",
             section.name()

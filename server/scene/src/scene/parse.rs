@@ -41,7 +41,7 @@ pub(super) struct SceneSpec {
 fn scene_name(root: &Section<'_>) -> Option<String> {
     let name = root.required_text("name", "name = \"my-scene\"")?;
     if name.contains(char::is_control) {
-        let at = root.get("name").map_or(root.at(), |node| &node.at);
+        let at = root.at_key("name");
         let text = format!("the name {name:?} has a control character; write another");
         root.complain(at, text);
     }
@@ -106,10 +106,7 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
 }
 
 fn god_object(section: Section<'_>) -> Option<BodySpec> {
-    let shape_at = section
-        .get("shape")
-        .map_or(section.at(), |node| &node.at)
-        .clone();
+    let shape_at = section.at_key("shape").clone();
     let shape = shape(&section).map(Shape::held);
     let mass = mass(&section);
     let pose = pose(&section);
@@ -137,7 +134,7 @@ fn mass(section: &Section<'_>) -> Option<MassSpec> {
         .map(MassSpec::Density);
     match (section.has("mass"), section.has("density")) {
         (true, true) => {
-            let at = section.get("density").map_or(section.at(), |node| &node.at);
+            let at = section.at_key("density");
             section.complain(
                 at,
                 format!(
@@ -172,15 +169,12 @@ fn reference_point(section: &Section<'_>) -> Option<ReferencePoint> {
 fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
     let mut obstacles: Vec<ObstacleSpec> = Vec::new();
     for section in root.sections("obstacle") {
-        let shape_at = section
-            .get("shape")
-            .map_or(section.at(), |node| &node.at)
-            .clone();
+        let shape_at = section.at_key("shape").clone();
         let name = object_name(&section, "name = \"box\"");
         if let Some(name) = &name
             && obstacles.iter().any(|other| other.name == *name)
         {
-            let at = section.get("name").map_or(section.at(), |node| &node.at);
+            let at = section.at_key("name");
             section.complain(
                 at,
                 format!("there are two obstacles of the name \"{name}\"; rename one"),
@@ -222,10 +216,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
 }
 
 fn motion(section: Section<'_>) -> Option<MotionSpec> {
-    let at = section
-        .get("trace")
-        .map_or(section.at(), |node| &node.at)
-        .clone();
+    let at = section.at_key("trace").clone();
     let trace = section
         .required_text("trace", "trace = \"plate.csv\"")
         .map(str::to_owned);
@@ -239,10 +230,7 @@ fn motion(section: Section<'_>) -> Option<MotionSpec> {
 }
 
 fn hand(section: Section<'_>) -> Option<HandPathSpec> {
-    let at = section
-        .get("path")
-        .map_or(section.at(), |node| &node.at)
-        .clone();
+    let at = section.at_key("path").clone();
     let path = section
         .required_text("path", "path = \"hand.csv\"")
         .map(str::to_owned);

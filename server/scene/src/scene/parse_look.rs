@@ -24,7 +24,7 @@ pub(super) fn scenery(root: &Section<'_>, obstacles: &[ObstacleSpec]) -> Vec<Sce
             return scenery;
         }
         let name = object_name(&section, "name = \"room\"");
-        let at = |key| section.get(key).map_or(section.at(), |node| &node.at);
+        let at = |key| section.at_key(key);
         if let Some(name) = &name {
             let mut others = obstacles.iter().map(|other| &other.name);
             if others.any(|other| other == name) || scenery.iter().any(|other| other.name == *name)

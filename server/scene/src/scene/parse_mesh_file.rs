@@ -32,7 +32,7 @@ fn only(shape: &Section<'_>) -> Vec<String> {
         return Vec::new();
     };
     if names.is_empty() {
-        let at = shape.get("only").map_or(shape.at(), |node| &node.at);
+        let at = shape.at_key("only");
         let text = format!(
             "`only` in {} names no piece; write names of nodes, objects or groups, as only = [\"peg\"], or leave it out",
             shape.name()

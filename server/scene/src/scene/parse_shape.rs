@@ -31,7 +31,7 @@ type ReadPrimitive = fn(&Section<'_>) -> Option<Shape>;
 pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
     let shape = shape_of(body, "shape")?;
     if matches!(shape, Shape::Hand { .. } | Shape::Board { .. }) {
-        let at = body.get("shape").map_or(body.at(), |node| &node.at);
+        let at = body.at_key("shape");
         let text = "`hand` and `board` are only seen; write them as the shape of a [[scenery]], or as a `visual`";
         body.complain(at, text);
         return None;
@@ -261,9 +261,7 @@ pub(crate) fn rotation_of(section: &Section<'_>) -> Option<UnitQuaternion<f64>> 
     let wxyz = section.numbers::<4>("rotation", Range::Finite)?;
     unit_quaternion(wxyz)
         .map_err(|text| {
-            let at = section
-                .get("rotation")
-                .map_or(section.at(), |node| &node.at);
+            let at = section.at_key("rotation");
             section.complain(at, format!("`rotation` in {}: {text}", section.name()));
         })
         .ok()
@@ -340,7 +338,7 @@ fn height_map(section: &Section<'_>) -> Option<HeightMapSpec> {
             .required_number("tile", Range::Positive, "tile = 0.05")
             .map(|tile| HeightMapMapping::Triplanar { tile })
     };
-    let at = section.get("file").map_or(section.at(), |node| &node.at);
+    let at = section.at_key("file");
     Some(HeightMapSpec {
         path: path?.to_owned(),
         mapping: mapping?,

@@ -106,7 +106,7 @@ fn value(section: &Section<'_>, key: &Key, files: &Files<'_>) -> Option<Value> {
             let text = section.text(name)?;
             let value = key.takes.read(text);
             if value.is_none() {
-                let at = section.get(name).map_or(section.at(), |node| &node.at);
+                let at = section.at_key(name);
                 let wanted = key.takes.wanted();
                 section.complain(
                     at,

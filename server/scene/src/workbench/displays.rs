@@ -63,7 +63,7 @@ pub(super) fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
         let name = unique_name(&section, "node", nodes.iter().map(|n| n.name.as_str()));
         let drawn = screens_of(&section, screens);
         let stereo = section.choice("stereo", &Stereo::NAMED).unwrap_or_default();
-        let at = section.get("stereo").map_or(section.at(), |node| &node.at);
+        let at = section.at_key("stereo");
         let named = name.as_deref().unwrap_or_default();
         for screen in screens.iter().filter(|screen| drawn.contains(&screen.name)) {
             if let Some(text) = fault_of_node(named, stereo, screen) {
@@ -154,7 +154,7 @@ pub(super) fn unique_name<'n>(
 ) -> Option<String> {
     let name = section.required_text("name", &format!("name = \"{kind}-1\""))?;
     if others.any(|other| other == name) {
-        let at = section.get("name").map_or(section.at(), |node| &node.at);
+        let at = section.at_key("name");
         section.complain(
             at,
             format!("there are two {kind}s of the name \"{name}\"; rename one"),

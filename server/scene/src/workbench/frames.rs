@@ -53,9 +53,7 @@ pub(super) fn frames(section: &Section<'_>) -> Frames {
         .number("least_rate", rates)
         .unwrap_or(default.least_rate.min(rate));
     if least_rate > rate {
-        let at = section
-            .get("least_rate")
-            .map_or(section.at(), |node| &node.at);
+        let at = section.at_key("least_rate");
         section.complain(
             at,
             format!(

@@ -155,7 +155,7 @@ pub(super) fn observers(section: &Section<'_>, files: &Files<'_>) -> ObserverStr
         max_observers: most(section, "max_observers", default.max_observers),
     };
     if stream.enabled && !stream.bind.is_loopback() && stream.token_file.is_none() {
-        let at = section.get("bind").map_or(section.at(), |node| &node.at);
+        let at = section.at_key("bind");
         section.complain(
             at,
             "`bind` in [observers] lets other machines in, but there is no token; name one by token_file = \"observers.token\", or bind to \"127.0.0.1\"",
@@ -183,7 +183,7 @@ pub(super) fn zenoh(section: &Section<'_>, files: &Files<'_>) -> Zenoh {
             .unwrap_or(default.ros_domain),
     };
     if zenoh.ros && !is_word(&zenoh.name) {
-        let at = section.get("name").map_or(section.at(), |node| &node.at);
+        let at = section.at_key("name");
         section.complain(
             at,
             format!(
@@ -216,7 +216,7 @@ fn name(section: &Section<'_>, key: &'static str) -> Option<String> {
     let text = section.text(key)?;
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     if text.is_empty() || text.len() > MAX_NAME || !text.chars().all(is_plain) {
-        let at = section.get(key).map_or(section.at(), |node| &node.at);
+        let at = section.at_key(key);
         section.complain(
             at,
             format!(

@@ -93,7 +93,7 @@ fn address_of(section: &Section<'_>, text: &str) -> Option<IpAddr> {
 }
 
 fn complain(section: &Section<'_>, key: &'static str, text: String) {
-    let at = section.get(key).map_or(section.at(), |node| &node.at);
+    let at = section.at_key(key);
     section.complain(at, text);
 }
 
@@ -193,7 +193,7 @@ fn complain_of_nodes(
 
 /// What is wrong with the machines together.
 fn complain_of_all(root: &Section<'_>, machines: &[Machine], named: &Named<'_>) {
-    let at = root.get("machine").map_or(root.at(), |node| &node.at);
+    let at = root.at_key("machine");
     let complain = |text: String| root.complain(at, text);
     let count = |of: fn(&Machine) -> bool| machines.iter().filter(|machine| of(machine)).count();
     match count(|machine| machine.server) {

@@ -32,9 +32,7 @@ pub(super) fn monitoring(
         monitoring.memory_limit = mebibytes.unsigned_abs() << 20;
     }
     if monitoring.grpc_port == monitoring.web_port && monitoring.web_port != 0 {
-        let at = section
-            .get("web_port")
-            .map_or(section.at(), |node| &node.at);
+        let at = section.at_key("web_port");
         section.complain(
             at,
             format!(

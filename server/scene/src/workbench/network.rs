@@ -29,7 +29,7 @@ fn multicast(
     bind: IpAddr,
 ) -> (SocketAddrV4, Ipv4Addr) {
     let complain = |key: &'static str, text: String| {
-        let at = section.get(key).map_or(section.at(), |node| &node.at);
+        let at = section.at_key(key);
         section.complain(at, text);
     };
     let group = match section.text("multicast_group") {
@@ -75,7 +75,7 @@ fn also_key(section: &Section<'_>, files: &Files<'_>) -> Option<AlsoKeyFile> {
     let until = section.text("also_key_until").and_then(|text| {
         let time = humantime::parse_rfc3339(text).ok();
         if time.is_none() {
-            let at = section.get("also_key_until").map_or(section.at(), |node| &node.at);
+            let at = section.at_key("also_key_until");
             section.complain(at, format!("`also_key_until` in {} is \"{text}\", which is no time; write one in UTC such as \"2030-01-31T12:00:00Z\"", section.name()));
         }
         time
@@ -102,7 +102,7 @@ fn also_key(section: &Section<'_>, files: &Files<'_>) -> Option<AlsoKeyFile> {
 
 /// Whether everybody whom the workbench names finds room.
 pub(super) fn places(root: &Section<'_>, network: &Network, nodes: usize, frames: &Frames) {
-    let at = root.get("network").map_or(root.at(), |node| &node.at);
+    let at = root.at_key("network");
     let needed = nodes + SINGLE_PLACES;
     if network.max_clients < needed {
         root.complain(
@@ -114,7 +114,7 @@ pub(super) fn places(root: &Section<'_>, network: &Network, nodes: usize, frames
         );
     }
     if nodes > MAX_MEMBERS && frames.swap != FrameSwap::Off {
-        let at = root.get("node").map_or(root.at(), |node| &node.at);
+        let at = root.at_key("node");
         root.complain(
             at,
             format!(

@@ -44,7 +44,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
 fn workbench(root: &Section<'_>, files: &Files<'_>) -> Option<Workbench> {
     let name = root.required_text("name", "name = \"workbench\"");
     let scene = root.required_text("scene", "scene = \"peg-in-a-hole\"");
-    let scene_at = root.get("scene").map_or(root.at(), |node| &node.at).clone();
+    let scene_at = root.at_key("scene").clone();
     let scene_origin = table(root, "scene_origin", pose_of).flatten();
     let screens = screens(root);
     let nodes = nodes(root, &screens);

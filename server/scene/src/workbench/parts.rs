@@ -61,7 +61,7 @@ pub(super) fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
     };
     let address = text.parse();
     if address.is_err() {
-        let at = section.get("bind").map_or(section.at(), |node| &node.at);
+        let at = section.at_key("bind");
         section.complain(
             at,
             format!(

@@ -74,7 +74,7 @@ fn fades(
 ) {
     let reach = slew * Safety::FADE_MS;
     if let Some(limit) = limit.filter(|limit| *limit > reach) {
-        let at = section.get(limit_key).map_or(section.at(), |node| &node.at);
+        let at = section.at_key(limit_key);
         section.complain(
             at,
             format!(

@@ -151,9 +151,7 @@ fn wrench_in_of(section: &Section<'_>) -> WrenchIn {
 fn age(section: &Section<'_>) -> Option<f64> {
     let age = section.number("max_age_ms", Range::PositiveUpTo(LONGEST_AGE_MS))?;
     if age < SHORTEST_AGE_MS {
-        let at = section
-            .get("max_age_ms")
-            .map_or(section.at(), |node| &node.at);
+        let at = section.at_key("max_age_ms");
         let text = format!(
             "`max_age_ms` in [wrench_in] is {age}, which leaves no time to fade; write {SHORTEST_AGE_MS} to {LONGEST_AGE_MS}"
         );
@@ -167,7 +165,7 @@ fn ros_topic(section: &Section<'_>, topic: Option<&str>) -> Option<String> {
     match topic {
         Some(text) if is_topic(text) => Some(text.to_owned()),
         Some(text) => {
-            let at = section.get("topic").map_or(section.at(), |node| &node.at);
+            let at = section.at_key("topic");
             section.complain(
                 at,
                 format!("`topic` in [wrench_in] is \"{text}\", which is no absolute name of ROS 2; write one such as \"/ft_sensor/wrench\""),
@@ -184,7 +182,7 @@ fn ros_topic(section: &Section<'_>, topic: Option<&str>) -> Option<String> {
 /// Complains of what does not go with it.
 fn complain_beside(section: &Section<'_>, wanted: &WrenchIn, (device, safety, zenoh): Beside<'_>) {
     let complain = |key: &'static str, text: String| {
-        let at = section.get(key).map_or(section.at(), |node| &node.at);
+        let at = section.at_key(key);
         section.complain(at, text);
     };
     // A bridge keeps the energy itself, or feels nothing of it.
