@@ -2,6 +2,7 @@
 
 use super::at::{At, Purpose, Surfaces};
 use super::row::{Known, jacobian};
+use super::kept::FEW;
 use super::{RowReduction, TOUCHING_REST_DISTANCES};
 use crate::constraint::{Collected, Contact};
 use crate::spatial::{Vector6, angular, linear};
@@ -83,7 +84,8 @@ impl RowReduction {
         self.served = self.served.min(within.max(searched));
     }
 
-    /// Adds a contact of the present pose to choose from where one of the motions violates it, world frame; whether it does.
+    /// Adds a contact of the present pose to choose from where one of the motions violates it, world frame; whether it does. Of the others that a search for
+    /// the force came across a few become rows, as the device may go between its motions.
     pub(crate) fn offer_violated(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
@@ -98,7 +100,13 @@ impl RowReduction {
             let violation = at.rest_distance - gap - jacobian.dot(motion);
             violation > at.tolerance // false for NaN
         };
-        if !motions.iter().any(violated) || self.knows(&contact.features) {
+        if self.knows(&contact.features) {
+            return false;
+        }
+        if !motions.iter().any(violated) {
+            if purpose == Purpose::Force && self.known.len() < FEW.min(self.room) {
+                self.add(row);
+            }
             return false;
         }
         if self.candidates.room() == 0 {

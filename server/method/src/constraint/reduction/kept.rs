@@ -5,8 +5,8 @@ use super::at::{At, Surfaces};
 use super::row::Known;
 use crate::constraint::FeaturePair;
 
-/// So many candidates all become rows of a published set.
-const FEW: usize = 64;
+/// So many candidates all become rows of a published set, and so many in all with what a search for the force comes across.
+pub(super) const FEW: usize = 64;
 /// Updates that a row outlives its last use: rows do not come and go with every tremor.
 const IDLE_UPDATES: u32 = 8;
 /// The same for a row that is implied: it matters in the corner that the body is in, and nowhere else.
