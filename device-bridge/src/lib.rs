@@ -40,6 +40,8 @@ mod port;
 pub mod pseudo_terminal;
 pub mod realtime;
 mod report;
+#[cfg(unix)]
+mod serial_port;
 pub mod service_manager;
 pub mod signals;
 mod simulate;

@@ -4,6 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
+/// A thread that the system does not start: what for, and what the system says.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cannot start a thread for {0}: {1}; end other programs or raise the limit")]
+pub struct ThreadError(pub(crate) &'static str, pub(crate) String);
+
 /// A thread that works for its owner. Dropping this tells it to end, and waits until it has.
 #[derive(Debug)]
 pub struct OwnThread {

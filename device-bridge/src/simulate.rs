@@ -8,14 +8,14 @@ use std::thread;
 use std::time::Duration;
 
 use serde::Serialize;
-use taut_plant::{MinJerkPath, PathError, Tremor};
+use taut_plant::{MinJerkPath, Tremor};
 
 use crate::console;
 use crate::devices::HandPreset;
 use crate::haply::{HaplyService, SimulatedInverse, SimulatedSettings};
 use crate::realtime::monotonic_now;
 use crate::signals::EndFlag;
-use crate::trace_file::{TraceFileError, read_trace, via_points};
+use crate::trace_file::{TraceFileError, read_path};
 
 /// How often the end is looked for.
 const LOOK: Duration = Duration::from_millis(20);
@@ -125,14 +125,8 @@ struct PlayedHand {
 
 impl PlayedHand {
     fn path(&self) -> Result<Option<MinJerkPath>, SimulateError> {
-        let Some(file) = &self.path else {
-            return Ok(None);
-        };
-        let path = MinJerkPath::new(via_points(&read_trace(file)?), true);
-        path.map(Some).map_err(|cause| SimulateError::Path {
-            path: file.clone(),
-            cause,
-        })
+        let path = self.path.as_ref().map(|file| read_path(file, true));
+        Ok(path.transpose()?)
     }
 }
 
@@ -148,8 +142,6 @@ enum SimulateError {
     },
     #[error(transparent)]
     File(#[from] TraceFileError),
-    #[error("{}: {cause}", path.display())]
-    Path { path: PathBuf, cause: PathError },
     #[cfg(unix)]
     #[error(transparent)]
     Geometry(#[from] crate::simulated_strings::StringsError),

@@ -6,27 +6,23 @@ use std::path::{Path, PathBuf};
 
 use taut_recording::{MAX_TRACE_BYTES, TraceFault, TraceSample, parse_trace};
 
-use crate::devices::{Trace, ViaPoint};
+use crate::devices::{MinJerkPath, PathError, Trace, TraceError, ViaPoint};
 
 /// Why a trace file was not read.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceFileError {
     /// The file cannot be opened or read, or is no text.
-    #[error("cannot read the trace {}: {cause}; check the path and that it is a CSV file", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        cause: io::Error,
-    },
+    #[error("cannot read the trace {0}: {1}; check the path and that it is a CSV file")]
+    Unreadable(PathBuf, io::Error),
     /// Its first fault.
-    #[error("the trace {}{}: {fault}", path.display(), fault.line.map_or_else(String::new, |line| format!(":{line}")))]
-    Faulty {
-        /// The file.
-        path: PathBuf,
-        /// Where and what.
-        fault: TraceFault,
-    },
+    #[error("the trace {0}{line}: {1}", line = .1.line.map_or_else(String::new, |line| format!(":{line}")))]
+    Faulty(PathBuf, TraceFault),
+    /// It cannot be followed by a hand.
+    #[error("{0}: {1}")]
+    Path(PathBuf, PathError),
+    /// It cannot be replayed.
+    #[error("{0}: {1}")]
+    Trace(PathBuf, TraceError),
 }
 
 /// Reads the trace at `path`.
@@ -34,16 +30,14 @@ pub enum TraceFileError {
 /// # Errors
 /// [`TraceFileError`] names file and line of the first fault.
 pub fn read_trace(path: &Path) -> Result<Trace, TraceFileError> {
-    let text = read_text(path).map_err(|cause| TraceFileError::Unreadable {
-        path: path.to_owned(),
-        cause,
-    })?;
-    let rows = parse_trace(&text).map_err(|faults| TraceFileError::Faulty {
-        path: path.to_owned(),
-        fault: faults.into_iter().next().unwrap_or_else(|| TraceFault {
+    let unreadable = |cause| TraceFileError::Unreadable(path.to_owned(), cause);
+    let text = read_text(path).map_err(unreadable)?;
+    let rows = parse_trace(&text).map_err(|faults| {
+        let fault = faults.into_iter().next().unwrap_or_else(|| TraceFault {
             line: None,
             text: "is no trace".to_owned(),
-        }),
+        });
+        TraceFileError::Faulty(path.to_owned(), fault)
     })?;
     Ok(rows.samples)
 }
@@ -60,6 +54,12 @@ fn read_text(path: &Path) -> io::Result<String> {
         ));
     }
     Ok(text)
+}
+
+/// The trace at `path` as a hand's intention, for ever where it is `looping`.
+pub(crate) fn read_path(path: &Path, looping: bool) -> Result<MinJerkPath, TraceFileError> {
+    let followed = MinJerkPath::new(via_points(&read_trace(path)?), looping);
+    followed.map_err(|cause| TraceFileError::Path(path.to_owned(), cause))
 }
 
 /// The rows of a trace as via points of a hand's intention; their times count from the first row.

@@ -1,14 +1,12 @@
 //! Why a bridge did not run, or did not run to its end.
 
-use std::path::PathBuf;
-
 use taut_link::LinkError;
 use taut_link::proto::SceneDescription;
 
 use crate::choice::InputError;
 use crate::cli::BridgeArgs;
-use crate::devices::{PathError, TraceError};
 use crate::edge::OfferError;
+use crate::own_thread::ThreadError;
 use crate::report::BridgeReport;
 use crate::simulated_strings::StringsError;
 use crate::trace_file::TraceFileError;
@@ -31,25 +29,9 @@ pub enum BridgeError {
         /// What may be given.
         range: &'static str,
     },
-    /// A trace or path file is wrong.
+    /// A trace or path file is wrong, or cannot be followed.
     #[error(transparent)]
     File(#[from] TraceFileError),
-    /// A path cannot be followed.
-    #[error("{}: {cause}", path.display())]
-    Path {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        cause: PathError,
-    },
-    /// A trace cannot be replayed.
-    #[error("{}: {cause}", path.display())]
-    Trace {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        cause: TraceError,
-    },
     /// An input device cannot be read.
     #[error(transparent)]
     Input(#[from] InputError),
@@ -72,23 +54,15 @@ pub enum BridgeError {
     NoStartPose,
     /// The server does not let the bridge couple.
     #[error(
-        "the server couples by itself ({reason}): leave out `--coupling edge`, and keep the network short"
+        "the server couples by itself ({0}): leave out `--coupling edge`, and keep the network short"
     )]
-    NoEdge {
-        /// What it says.
-        reason: String,
-    },
+    NoEdge(String),
     /// The server's offer makes no coupling.
     #[error(transparent)]
     Offer(#[from] OfferError),
     /// A thread cannot be started.
-    #[error("cannot start a thread for {what}: {cause}; end other programs or raise the limit")]
-    Thread {
-        /// What for.
-        what: &'static str,
-        /// What the system says.
-        cause: std::io::Error,
-    },
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
     /// The end was asked for before there was a server.
     #[error(
         "no server was there at {server} until the end: check that it runs, the address, and that the firewall lets UDP through"
@@ -138,7 +112,7 @@ impl BridgeError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Thread { .. } | Self::Signals(_) => 1,
+            Self::Thread(_) | Self::Signals(_) => 1,
             // Who waits for a server without end has done so.
             Self::NeverJoined { stays, .. } => u8::from(!stays),
             Self::LoopBroke => 1,

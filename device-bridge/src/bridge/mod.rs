@@ -33,6 +33,7 @@ use crate::bridge_loop::BridgeLoop;
 use crate::cli::BridgeArgs;
 use crate::device::Device;
 use crate::device_loop::Totals;
+use crate::own_thread::ThreadError;
 use crate::placement::Placement;
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
@@ -97,10 +98,7 @@ fn run_loop(
         .thread_name("taut-bridge-net")
         .enable_all()
         .build()
-        .map_err(|cause| BridgeError::Thread {
-            what: "the network",
-            cause,
-        })?;
+        .map_err(|cause| ThreadError("the network", cause.to_string()))?;
 
     let deadline = args
         .duration

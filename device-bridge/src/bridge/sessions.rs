@@ -19,6 +19,7 @@ use crate::cli::{BridgeArgs, CouplingChoice};
 use crate::device::DeviceFault;
 use crate::device_loop::{DeviceLoop, Notice, Totals};
 use crate::edge::EdgeCoupler;
+use crate::own_thread::ThreadError;
 use crate::port::{CommandSource, SafetySettings};
 use crate::report::BridgeReport;
 
@@ -283,10 +284,7 @@ impl Run<'_> {
                 device_loop.run(&mut bridge);
                 (bridge, device_loop.totals)
             })
-            .map_err(|cause| BridgeError::Thread {
-                what: "the device loop",
-                cause,
-            })?;
+            .map_err(|cause| ThreadError("the device loop", cause.to_string()))?;
         Ok(LoopThread {
             end: end_loop,
             thread: Some(thread),
@@ -403,13 +401,12 @@ fn edge_coupler(
             Ok(None)
         }
         (Some(CouplingChoice::Edge), Some(CouplingOffer::AtServer { reason })) => {
-            Err(BridgeError::NoEdge {
-                reason: reason.to_string(),
-            })
+            Err(BridgeError::NoEdge(reason.to_string()))
         }
-        (Some(CouplingChoice::Edge), None) => Err(BridgeError::NoEdge {
-            reason: "it says nothing of another way".to_owned(),
-        }),
+        (Some(CouplingChoice::Edge), None) => {
+            let reason = "it says nothing of another way";
+            Err(BridgeError::NoEdge(reason.to_owned()))
+        }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::devices::{AtEnd, Grip, MinJerkPath, RecordedDevice, SimulatedDevice, 
 use crate::placement::Placement;
 use crate::port::{DevicePort, Passivity, SafetySettings};
 use crate::simulated_strings::{simulated_spidar, string_geometry};
-use crate::trace_file::{read_trace, via_points};
+use crate::trace_file::{TraceFileError, read_path, read_trace};
 
 /// States per second for a client that draws nothing: the fewest.
 const STATE_RATE_HZ: u32 = 1;
@@ -42,64 +42,13 @@ pub(super) enum Motion {
 }
 
 pub(super) fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
-    let in_range = |option, value: f64, valid: bool, range| {
-        if valid {
-            Ok(())
-        } else {
-            Err(BridgeError::OutOfRange {
-                option,
-                value,
-                range,
-            })
-        }
-    };
-    in_range(
-        "--rate",
-        args.rate,
-        RATES_HZ.contains(&args.rate),
-        "100 to 10000 Hz",
-    )?;
-    for (option, value) in [
-        ("--max-force", args.safety.max_force),
-        ("--max-torque", args.safety.max_torque),
-        ("--force-slew", args.safety.force_slew),
-        ("--torque-slew", args.safety.torque_slew),
-    ] {
-        in_range(
-            option,
-            value,
-            value > 0.0 && value <= 1e3,
-            "a number above 0, at most 1000",
-        )?;
-    }
-    let stiffness = args.safety.contact_stiffness;
-    in_range(
-        "--contact-stiffness",
-        stiffness,
-        (0.0..=MAX_CONTACT_STIFFNESS).contains(&stiffness),
-        "0 to 20000 N/m",
-    )?;
-    if let Some(seconds) = args.duration {
-        let valid = (0.0..=1e9).contains(&seconds);
-        in_range("--duration", seconds, valid, "0 to 1e9 s")?;
-    }
-    if let Some(seconds) = args.give_up {
-        let valid = (0.0..=1e9).contains(&seconds);
-        in_range("--give-up", seconds, valid, "0 to 1e9 s")?;
-    }
-
+    check_ranges(args)?;
     let motion = match (&args.device, &args.path) {
         (DeviceChoice::Mouse, _) => return Err(BridgeError::Mouse),
         (DeviceChoice::Input(input), _) => Motion::Input(input.clone()),
         (DeviceChoice::Trace(file), _) => Motion::Trace(file.clone(), read_trace(file)?),
         (DeviceChoice::Simulated { strings }, file) => {
-            let path = file.as_ref().map(|file| {
-                let path = MinJerkPath::new(via_points(&read_trace(file)?), args.looping);
-                path.map_err(|cause| BridgeError::Path {
-                    path: file.clone(),
-                    cause,
-                })
-            });
+            let path = file.as_ref().map(|file| read_path(file, args.looping));
             Motion::Held {
                 path: path.transpose()?,
                 strings: strings
@@ -112,6 +61,37 @@ pub(super) fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), Brid
     };
 
     Ok((client_options(args)?, motion))
+}
+
+fn check_ranges(args: &BridgeArgs) -> Result<(), BridgeError> {
+    let safety = &args.safety;
+    let rate = (RATES_HZ, "100 to 10000 Hz");
+    let limit = (f64::MIN_POSITIVE..=1e3, "a number above 0, at most 1000");
+    let contact = (0.0..=MAX_CONTACT_STIFFNESS, "0 to 20000 N/m");
+    let seconds = (0.0..=1e9, "0 to 1e9 s");
+    for (option, value, &(ref valid, range)) in [
+        ("--rate", Some(args.rate), &rate),
+        ("--max-force", Some(safety.max_force), &limit),
+        ("--max-torque", Some(safety.max_torque), &limit),
+        ("--force-slew", Some(safety.force_slew), &limit),
+        ("--torque-slew", Some(safety.torque_slew), &limit),
+        (
+            "--contact-stiffness",
+            Some(safety.contact_stiffness),
+            &contact,
+        ),
+        ("--duration", args.duration, &seconds),
+        ("--give-up", args.give_up, &seconds),
+    ] {
+        if let Some(value) = value.filter(|value| !valid.contains(value)) {
+            return Err(BridgeError::OutOfRange {
+                option,
+                value,
+                range,
+            });
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn client_options(args: &BridgeArgs) -> Result<ClientOptions, BridgeError> {
@@ -180,10 +160,7 @@ pub(super) fn build_loop(
                 AtEnd::Fault
             };
             let device = RecordedDevice::new(trace.clone(), at_end, reference_point);
-            Box::new(device.map_err(|cause| BridgeError::Trace {
-                path: path.clone(),
-                cause,
-            })?)
+            Box::new(device.map_err(|cause| TraceFileError::Trace(path.clone(), cause))?)
         }
     };
     Ok(behind_port(args, device, reference_point, &start))

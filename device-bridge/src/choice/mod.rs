@@ -81,13 +81,8 @@ pub enum InputError {
     #[error(transparent)]
     SpaceMouse(#[from] SourceError),
     /// The tracker.
-    #[error("cannot start to listen to the tracker {address}: {cause}; end other programs")]
-    Vrpn {
-        /// Of the tracker.
-        address: Address,
-        /// What the system says.
-        cause: std::io::Error,
-    },
+    #[error("cannot start to listen to the tracker {0}: {1}; end other programs")]
+    Vrpn(Address, std::io::Error),
     /// The Inverse service.
     #[error(transparent)]
     Haply(#[from] HaplyError),
@@ -97,14 +92,20 @@ pub enum InputError {
     /// The shared library.
     #[error(transparent)]
     Plugin(#[from] PluginError),
-    /// The Polhem board.
+    /// The port of a Polhem board.
     #[cfg(unix)]
     #[error(transparent)]
-    Polhem(#[from] crate::polhem::PolhemError),
+    Port(#[from] crate::serial_port::PortError),
     /// The WoodenHaptics board.
     #[cfg(unix)]
+    #[error(
+        "no WoodenHaptics board can be opened ({0}); plug it in, or let your user read it: echo 'KERNEL==\"hidraw*\", ATTRS{{idVendor}}==\"16c0\", MODE=\"0660\", TAG+=\"uaccess\"' | sudo tee /etc/udev/rules.d/70-taut-wooden.rules, then plug it in anew"
+    )]
+    Wooden(String),
+    /// The thread of either.
+    #[cfg(unix)]
     #[error(transparent)]
-    Wooden(#[from] crate::wooden::WoodenError),
+    Thread(#[from] crate::own_thread::ThreadError),
     /// A driver that is not here.
     #[error("devices on serial ports can be used on Unix only")]
     NotHere,
@@ -165,10 +166,8 @@ impl InputChoice {
             Self::Polhem(_) => return Err(InputError::NotHere),
             Self::Vrpn(settings) => {
                 let device = VrpnDevice::start(settings, placement);
-                Box::new(device.map_err(|cause| InputError::Vrpn {
-                    address: settings.source.address.clone(),
-                    cause,
-                })?)
+                let tracker = &settings.source.address;
+                Box::new(device.map_err(|cause| InputError::Vrpn(tracker.clone(), cause))?)
             }
         })
     }

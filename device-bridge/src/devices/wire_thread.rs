@@ -19,10 +19,15 @@ use std::time::Duration;
 
 use super::arm::{ArmPort, ArmState};
 use super::pace::Pace;
-use crate::realtime::{self, monotonic_now};
+use crate::own_thread::ThreadError;
+use crate::realtime::{self, Ticker, monotonic_now};
 
 /// From the last write of the device's loop on nothing is commanded any more; and a device that hears nothing for longer may have ended the force.
 pub(crate) const HOLDS: Duration = Duration::from_millis(20);
+/// From message to message of a driver, which keeps the time itself: [`ticker`].
+pub(crate) const PERIOD: Duration = Duration::from_millis(1);
+/// Where in the period a message goes out: just after the device's loop, whose command it carries.
+pub(crate) const PHASE: Duration = Duration::from_micros(350);
 /// Between two sessions.
 const RETRY: Duration = Duration::from_millis(200);
 /// A device that was there for longer and is gone is told of again.
@@ -207,11 +212,16 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
         (port, line)
     }
 
-    /// Runs `wire` in a thread called `thread`. `priority` asks for real time, 0 does not.
+    /// Runs `wire` in a thread called `thread`, which is for `what`. `priority` asks for real time, 0 does not.
     ///
     /// # Errors
     /// The system has no thread.
-    pub(crate) fn start<W>(thread: &str, priority: u8, wire: W) -> std::io::Result<Self>
+    pub(crate) fn start<W>(
+        thread: &str,
+        what: &'static str,
+        priority: u8,
+        wire: W,
+    ) -> Result<Self, ThreadError>
     where
         W: Wire<State = S, Command = C>,
     {
@@ -221,7 +231,8 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
             .spawn(move || {
                 ask_for_real_time(priority, &wire.name());
                 run(wire, line);
-            })?;
+            })
+            .map_err(|cause| ThreadError(what, cause.to_string()))?;
         port.thread = Some(thread);
         Ok(port)
     }
@@ -281,6 +292,11 @@ impl ArmPort for ArmThread {
     fn let_go(&mut self) -> bool {
         self.let_go()
     }
+}
+
+/// For the messages of a session.
+pub(crate) fn ticker() -> Ticker {
+    Ticker::at_phase(PERIOD, PHASE)
 }
 
 /// Asks for real time for this thread, unless `priority` is 0, and tells where it is refused.
@@ -369,7 +385,7 @@ mod tests {
             commands,
             lost: false,
         };
-        let thread = WireThread::start("scripted", 0, wire).expect("a thread");
+        let thread = WireThread::start("scripted", "a test", 0, wire).expect("a thread");
         (thread, said)
     }
 

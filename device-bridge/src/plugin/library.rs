@@ -107,27 +107,18 @@ struct Fitting {
 impl PluginLibrary {
     /// Loads `path` and asks for its table.
     fn load(path: &Path) -> Result<Self, PluginError> {
-        let whole = path.canonicalize().map_err(|error| PluginError::Missing {
-            path: path.to_owned(),
-            example: "plugin:/path/lib.so",
-            cause: error.to_string(),
+        let whole = path.canonicalize().map_err(|error| {
+            PluginError::Missing(path.to_owned(), error.to_string(), "plugin:/path/lib.so")
         })?;
         // SAFETY: the user names the library as trusted code; its initialisers run here, in the one thread that calls it.
-        let library = unsafe { Library::new(&whole) }.map_err(|error| PluginError::Load {
-            path: whole.clone(),
-            cause: error.to_string(),
-        })?;
+        let library = unsafe { Library::new(&whole) }
+            .map_err(|error| PluginError::Load(whole.clone(), error.to_string()))?;
         // Never unloaded: its functions stay valid, for its own threads too.
         let library: &'static Library = Box::leak(Box::new(library));
         // SAFETY: the header declares the symbol with this signature; what is named so and is something else is no plug-in.
         let entry = unsafe { library.get::<Entry>(ENTRY.as_bytes()) };
-        let entry = entry.map_err(|_| PluginError::NoEntry {
-            path: whole.clone(),
-        })?;
-        let misfit = |what: String| PluginError::Table {
-            path: whole.clone(),
-            what,
-        };
+        let entry = entry.map_err(|_| PluginError::NoEntry(whole.clone()))?;
+        let misfit = |what: String| PluginError::Table(whole.clone(), what);
         // SAFETY: the function takes nothing.
         let raw = unsafe { entry() };
         if raw.is_null() || !raw.is_aligned() {
@@ -162,10 +153,7 @@ impl PluginLibrary {
 
     /// Opens the device and asks what it is; closed again when it is dropped.
     fn open(&self, options: &str) -> Result<(OpenLibrary<'_>, PluginInfo), PluginError> {
-        let failed = |cause: String| PluginError::Open {
-            path: self.path.clone(),
-            cause,
-        };
+        let failed = |cause: String| PluginError::Open(self.path.clone(), cause);
         let options =
             CString::new(options).map_err(|_| failed("an option contains a 0".to_owned()))?;
         let mut device = std::ptr::null_mut();
@@ -184,10 +172,8 @@ impl PluginLibrary {
         if answer != Answer::Good {
             return Err(failed(open.error_text(answer)));
         }
-        let info = PluginInfo::of(&info).map_err(|claim| PluginError::Info {
-            path: self.path.clone(),
-            claim,
-        })?;
+        let info = PluginInfo::of(&info);
+        let info = info.map_err(|claim| PluginError::Info(self.path.clone(), claim))?;
         Ok((open, info))
     }
 

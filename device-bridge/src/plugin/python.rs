@@ -55,10 +55,8 @@ impl PythonFile {
         }
         Ok(Self {
             interpreter: interpreter.to_owned(),
-            path: path.canonicalize().map_err(|error| PluginError::Missing {
-                path: path.to_owned(),
-                example: "python:/path/device.py",
-                cause: error.to_string(),
+            path: path.canonicalize().map_err(|error| {
+                PluginError::Missing(path.to_owned(), error.to_string(), "python:/path/device.py")
             })?,
             options,
             priority,
@@ -66,9 +64,8 @@ impl PythonFile {
     }
 
     fn start(&self, end: &Arc<AtomicBool>) -> Result<Process, PluginError> {
-        let failed = |error: std::io::Error| PluginError::Interpreter {
-            interpreter: self.interpreter.clone(),
-            cause: error.to_string(),
+        let failed = |error: std::io::Error| {
+            PluginError::Interpreter(self.interpreter.clone(), error.to_string())
         };
         let (link, theirs) = UnixStream::pair().map_err(failed)?;
         link.set_read_timeout(Some(LOOK)).map_err(failed)?;
@@ -107,16 +104,11 @@ impl Opener for PythonFile {
         let mut process = self.start(end)?;
         match process.listen(OPEN_WITHIN, true) {
             Some(Said::Info(raw)) => {
-                let info = PluginInfo::of(&raw).map_err(|claim| PluginError::Info {
-                    path: self.path.clone(),
-                    claim,
-                })?;
+                let info = PluginInfo::of(&raw);
+                let info = info.map_err(|claim| PluginError::Info(self.path.clone(), claim))?;
                 Ok((Box::new(process), info))
             }
-            _ => Err(PluginError::Open {
-                path: self.path.clone(),
-                cause: process.wrong.clone(),
-            }),
+            _ => Err(PluginError::Open(self.path.clone(), process.wrong.clone())),
         }
     }
 }

@@ -10,14 +10,12 @@ use std::time::Duration;
 use super::claims::{PluginInfo, RawSample, Worth};
 use super::{Answer, Language, OpenDevice, Opener, PluginError};
 use crate::devices::pace::Pace;
-use crate::devices::wire_thread::{HOLDS, Line, Wire, WireThread, ask_for_real_time};
+use crate::devices::wire_thread::{
+    HOLDS, Line, PERIOD, PHASE, Wire, WireThread, ask_for_real_time,
+};
 use crate::devices::{ArmPort, ArmState};
 use crate::realtime::{Ticker, monotonic_now};
 
-/// Shortest from call to call.
-const PERIOD: Duration = Duration::from_millis(1);
-/// Where in the millisecond the calls are: just after the device's loop, whose wrench they carry.
-const PHASE: Duration = Duration::from_micros(350);
 /// For the first opening.
 const OPEN_WITHIN: Duration = Duration::from_secs(10);
 
@@ -49,8 +47,7 @@ impl Plugin {
             priority,
             ready,
         };
-        let thread = WireThread::start("taut-plugin", 0, talker)
-            .map_err(|error| PluginError::Thread(error.to_string()))?;
+        let thread = WireThread::start("taut-plugin", "the plug-in", 0, talker)?;
         match readied.recv_timeout(OPEN_WITHIN) {
             Ok(Ok(info)) => Ok((
                 Self {
@@ -60,10 +57,7 @@ impl Plugin {
                 info,
             )),
             Ok(Err(error)) => Err(error),
-            Err(_) => Err(PluginError::Hangs {
-                path: path.to_owned(),
-                seconds: OPEN_WITHIN.as_secs(),
-            }),
+            Err(_) => Err(PluginError::Hangs(path.to_owned(), OPEN_WITHIN.as_secs())),
         }
     }
 }

@@ -3,20 +3,16 @@
 use std::io::{Read, Write};
 use std::time::Duration;
 
-use serialport::SerialPort;
-
 use super::frame::{Frame, LINE as LINE_BYTES, force_frame, short_force_frame};
+use crate::choice::InputError;
 use crate::devices::ArmState;
-use crate::devices::wire_thread::{ArmLine, ArmThread, Wire, WireThread};
-use crate::realtime::{Ticker, monotonic_now};
+use crate::devices::wire_thread::{ArmLine, ArmThread, Wire, WireThread, ticker};
+use crate::realtime::monotonic_now;
+use crate::serial_port::{self, Port};
 use crate::spidar_uart::Counters;
 
 /// Nominal: the board is on USB, which has no baud.
 const BAUD: u32 = 115_200;
-/// From line to line.
-const PERIOD: Duration = Duration::from_millis(1);
-/// Where in the millisecond a line goes out: just after the device's loop.
-const PHASE: Duration = Duration::from_micros(350);
 /// An answer that is not there by then is none.
 const ANSWER_WITHIN: Duration = Duration::from_millis(3);
 /// Without a believed line for this long the port is opened anew.
@@ -28,53 +24,25 @@ const JUDGED: (f64, f64) = (1e-5, 1e-4);
 /// Most bytes without a line's end.
 const MAX_BUFFER: usize = 16 * LINE_BYTES;
 
-/// Why there is no board.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PolhemError {
-    /// The port cannot be opened.
-    #[error(
-        "the serial port {path} cannot be opened ({cause}); look at the cable and at `taut doctor`, and let your user open it: sudo usermod -aG dialout $USER, then log in again"
-    )]
-    Port {
-        /// As given.
-        path: String,
-        /// What the system says.
-        cause: String,
-    },
-    /// No thread.
-    #[error(
-        "cannot start a thread for the Polhem board: {0}; end other programs or raise the limit"
-    )]
-    Thread(String),
-}
-
 /// Opens the port; a board that says nothing yet is waited for. `priority` asks for real time, 0 does not.
 ///
 /// # Errors
-/// [`PolhemError`].
-pub(crate) fn start(path: &str, priority: u8) -> Result<ArmThread, PolhemError> {
+/// There is no such port, or no thread.
+pub(crate) fn start(path: &str, priority: u8) -> Result<ArmThread, InputError> {
     let serial = Serial {
         path: path.to_owned(),
-        opened: Some(open(path)?),
+        opened: Some(serial_port::open(path, BAUD, ANSWER_WITHIN)?),
         judge: Counters::new(JUDGED.0),
         before: None,
         buffer: Vec::with_capacity(MAX_BUFFER),
         line_bytes: None,
     };
-    let thread = WireThread::start("taut-polhem", priority, serial);
-    thread.map_err(|error| PolhemError::Thread(error.to_string()))
-}
-
-type Port = Box<dyn SerialPort>;
-
-fn open(path: &str) -> Result<Port, PolhemError> {
-    serialport::new(path, BAUD)
-        .timeout(ANSWER_WITHIN)
-        .open()
-        .map_err(|error| PolhemError::Port {
-            path: path.to_owned(),
-            cause: error.to_string(),
-        })
+    Ok(WireThread::start(
+        "taut-polhem",
+        "the Polhem board",
+        priority,
+        serial,
+    )?)
 }
 
 /// The thread's own.
@@ -102,7 +70,7 @@ impl Wire for Serial {
     fn session(&mut self, line: &mut ArmLine) -> Result<(), String> {
         let opened = self.opened.take();
         let mut port = opened
-            .map_or_else(|| open(&self.path), Ok)
+            .map_or_else(|| serial_port::open(&self.path, BAUD, ANSWER_WITHIN), Ok)
             .map_err(|error| error.to_string())?;
         let ended = self.turn(&mut port, line);
         self.let_go(&mut port);
@@ -125,7 +93,7 @@ impl Serial {
         self.buffer.clear();
         self.line_bytes = None;
         let mut believed = monotonic_now();
-        let mut ticker = Ticker::at_phase(PERIOD, PHASE);
+        let mut ticker = ticker();
         while !line.is_over() {
             ticker.wait();
             let force = line.command(monotonic_now()).unwrap_or_default();

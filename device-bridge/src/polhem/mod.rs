@@ -13,7 +13,6 @@ mod board;
 mod frame;
 mod simulated;
 
-pub use board::PolhemError;
 pub(crate) use board::start;
 pub use frame::{BrokenFrame, Frame, force_frame, read_force};
 pub use simulated::SimulatedPolhem;

@@ -3,12 +3,12 @@
 //! What keeps a current from outliving its reason, beside what [`WireThread`] does, since no board is known to let go by itself: zero currents are sent
 //! whenever no answer was believed for 20 ms, and first of all after the boards were found.
 
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use serialport::{ClearBuffer, SerialPort};
+use serialport::ClearBuffer;
 use taut_spidar::{Geometry, PerString, Reading, STRINGS, StringFault, StringHardware};
 
 use super::converter::{digit, digits_per_newton};
@@ -16,15 +16,12 @@ use super::counters::Counters;
 use super::cycle::{BrokenCycle, Cycle};
 use super::error::BoardsError;
 use super::packet::{BoardInfo, INFO, INFO_ANSWER, INFO_PADDING, MAX_BOARDS, header};
-use crate::devices::wire_thread::{HOLDS, Line, Wire, WireState, WireThread};
-use crate::realtime::{Ticker, monotonic_now};
+use crate::devices::wire_thread::{HOLDS, Line, Wire, WireState, WireThread, ticker};
+use crate::realtime::monotonic_now;
+use crate::serial_port::{self, Port, PortError};
 
 /// Of the boards.
 const BAUD: u32 = 2_000_000;
-/// From cycle to cycle.
-const PERIOD: Duration = Duration::from_millis(1);
-/// Where in the millisecond a cycle goes out: just after the device's loop, whose tensions it carries.
-const PHASE: Duration = Duration::from_micros(350);
 /// An answer that is not there by then is none: a busy machine is late by some milliseconds, cycle after cycle, and half of [`HOLDS`] harms no promise.
 const ANSWER_WITHIN: Duration = Duration::from_millis(10);
 /// The same of a board that is looked for: the line is asked once with each patience before it has none. A busy machine on either side answers late.
@@ -86,14 +83,11 @@ impl SpidarBoards {
             heard: Vec::with_capacity(512),
         };
         serial.found = Some(serial.find(&AtomicBool::new(false))?);
-        let thread = WireThread::start("taut-spidar", priority, serial);
-        let mut thread = thread.map_err(|error| BoardsError::Thread(error.to_string()))?;
+        let mut thread = WireThread::start("taut-spidar", "the motor boards", priority, serial)?;
         let until = monotonic_now() + COUNTS_WITHIN;
         while thread.newest().readings == 0 {
             if monotonic_now() > until {
-                return Err(BoardsError::Counts {
-                    path: path.to_owned(),
-                });
+                return Err(BoardsError::Counts(path.to_owned()));
             }
             thread::sleep(LOOK);
         }
@@ -133,8 +127,6 @@ impl StringHardware for SpidarBoards {
     }
 }
 
-type Port = Box<dyn SerialPort>;
-
 type BoardLine = Line<Counted, [i16; STRINGS]>;
 
 /// The thread's own.
@@ -173,20 +165,12 @@ impl Serial {
     /// Opens the port and looks for the boards, until `end`.
     fn find(&mut self, end: &AtomicBool) -> Result<(Port, Cycle), BoardsError> {
         let path = self.path.clone();
-        let failed = |error: &dyn std::fmt::Display| BoardsError::Port {
-            path: path.clone(),
-            cause: error.to_string(),
-        };
-        let port = serialport::new(&self.path, BAUD)
-            .timeout(FOUND_WITHIN[0])
-            .open();
-        let mut port = port.map_err(|error| failed(&error))?;
+        let failed = |cause: io::Error| PortError::new(&path, cause);
+        let mut port = serial_port::open(&path, BAUD, FOUND_WITHIN[0])?;
         // An answer may be late, or one of a question before.
         let mut found = (None, 0, Vec::new());
         for patience in FOUND_WITHIN {
-            port.set_timeout(patience).map_err(|error| failed(&error))?;
-            let boards = self.ask_all(&mut port, end);
-            let boards = boards.map_err(|error| failed(&error))?;
+            let boards = self.ask_all(&mut port, patience, end).map_err(failed)?;
             let motors = boards
                 .iter()
                 .map(|(_, info)| usize::from(info.motors))
@@ -198,16 +182,12 @@ impl Serial {
             }
         }
         let (cycle, motors, models) = found;
-        let cycle = cycle.ok_or_else(|| BoardsError::Motors {
-            path: self.path.clone(),
-            motors,
-        })?;
+        let cycle = cycle.ok_or_else(|| BoardsError::Motors(path.clone(), motors))?;
         cycle.set_up(&mut self.bytes);
-        port.write_all(&self.bytes)
-            .map_err(|error| failed(&error))?;
+        port.write_all(&self.bytes).map_err(failed)?;
         port.set_timeout(ANSWER_WITHIN)
-            .map_err(|error| failed(&error))?;
-        tracing::info!("motor boards on {}: models {models:?}", self.path);
+            .map_err(|cause| failed(cause.into()))?;
+        tracing::info!("motor boards on {path}: models {models:?}");
         Ok((port, cycle))
     }
 
@@ -215,8 +195,10 @@ impl Serial {
     fn ask_all(
         &mut self,
         port: &mut Port,
+        patience: Duration,
         end: &AtomicBool,
-    ) -> std::io::Result<Vec<(u8, BoardInfo)>> {
+    ) -> io::Result<Vec<(u8, BoardInfo)>> {
+        port.set_timeout(patience)?;
         let mut boards = Vec::new();
         for board in (0..MAX_BOARDS).take_while(|_| !end.load(Ordering::Relaxed)) {
             self.bytes.clear();
@@ -228,7 +210,7 @@ impl Serial {
             let mut answer = [0; INFO_ANSWER];
             match port.read_exact(&mut answer) {
                 Ok(()) => boards.extend(BoardInfo::parse(board, &answer).map(|info| (board, info))),
-                Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
+                Err(error) if error.kind() == io::ErrorKind::TimedOut => {}
                 Err(error) => return Err(error),
             }
         }
@@ -236,13 +218,8 @@ impl Serial {
     }
 
     /// Cycles until the end, or until the line is lost.
-    fn turn(
-        &mut self,
-        port: &mut Port,
-        cycle: &Cycle,
-        line: &mut BoardLine,
-    ) -> std::io::Result<()> {
-        let mut ticker = Ticker::at_phase(PERIOD, PHASE);
+    fn turn(&mut self, port: &mut Port, cycle: &Cycle, line: &mut BoardLine) -> io::Result<()> {
+        let mut ticker = ticker();
         let mut believed = monotonic_now();
         while !line.is_over() {
             ticker.wait();
@@ -259,13 +236,13 @@ impl Serial {
                     };
                     line.publish();
                 } else if self.counters.were_reset() {
-                    return Err(std::io::Error::other(
+                    return Err(io::Error::other(
                         "they began to count anew, so that the calibration is lost; hold the grip at the centre and start again",
                     ));
                 }
             }
             if monotonic_now().saturating_sub(believed) > GIVEN_UP {
-                return Err(std::io::Error::other("no answer is to be believed"));
+                return Err(io::Error::other("no answer is to be believed"));
             }
         }
         Ok(())
@@ -277,7 +254,7 @@ impl Serial {
         port: &mut Port,
         cycle: &Cycle,
         digits: &[i16; STRINGS],
-    ) -> std::io::Result<Result<[i16; STRINGS], BrokenCycle>> {
+    ) -> io::Result<Result<[i16; STRINGS], BrokenCycle>> {
         cycle.send(digits, &mut self.bytes);
         // What came too late answers a cycle before: taken for this one's, it would leave every later answer one cycle late.
         port.clear(ClearBuffer::Input)?;
@@ -287,9 +264,9 @@ impl Serial {
         let mut chunk = [0; 256];
         loop {
             match port.read(&mut chunk) {
-                Ok(0) => return Err(std::io::ErrorKind::UnexpectedEof.into()),
+                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
                 Ok(bytes) => self.heard.extend(&chunk[..bytes]),
-                Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
+                Err(error) if error.kind() == io::ErrorKind::TimedOut => {}
                 Err(error) => return Err(error),
             }
             let heard = cycle.hear(&self.heard);

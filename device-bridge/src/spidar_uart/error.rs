@@ -1,36 +1,24 @@
 //! Why there are no motor boards.
 
+use crate::own_thread::ThreadError;
+use crate::serial_port::PortError;
+
 /// Why there are no boards.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BoardsError {
     /// The port cannot be opened.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// Nobody answers on this port, or not eight motors.
     #[error(
-        "the serial port {path} cannot be opened ({cause}); look at the cable and at `taut doctor`, and let your user open it: sudo usermod -aG dialout $USER, then log in again"
+        "on {0} there are motor boards with {1} motors together, but a SPIDAR-G needs 8; look at the boards' supply and at their cables"
     )]
-    Port {
-        /// As given.
-        path: String,
-        /// What the system says.
-        cause: String,
-    },
-    /// Nobody answers, or not eight motors.
-    #[error(
-        "on {path} there are motor boards with {motors} motors together, but a SPIDAR-G needs 8; look at the boards' supply and at their cables"
-    )]
-    Motors {
-        /// As given.
-        path: String,
-        /// That were found.
-        motors: usize,
-    },
+    Motors(String, usize),
     /// They are there, and say nothing that is to be believed.
     #[error(
-        "the motor boards on {path} answer, but not in time or not twice alike, so that nobody knows where the grip is; look at their cables, and whether this machine is busy"
+        "the motor boards on {0} answer, but not in time or not twice alike, so that nobody knows where the grip is; look at their cables, and whether this machine is busy"
     )]
-    Counts {
-        /// As given.
-        path: String,
-    },
+    Counts(String),
     /// Nothing is known of the amplifiers.
     #[error(
         "the geometry {0} has no `volts_per_newton`, without which no current is known; write it into its file"
@@ -49,8 +37,6 @@ pub enum BoardsError {
         most: f64,
     },
     /// No thread.
-    #[error(
-        "cannot start a thread for the motor boards: {0}; end other programs or raise the limit"
-    )]
-    Thread(String),
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
 }

@@ -9,15 +9,12 @@ use nalgebra::Vector3;
 use super::kinematics::WoodenModel;
 use super::line::{ReportLine, open};
 use super::report::{BoardReport, HostReport};
+use crate::choice::InputError;
 use crate::devices::ArmState;
-use crate::devices::wire_thread::{ArmLine, ArmThread, Wire, WireThread};
-use crate::realtime::{Ticker, monotonic_now};
+use crate::devices::wire_thread::{ArmLine, ArmThread, Wire, WireThread, ticker};
+use crate::realtime::monotonic_now;
 use crate::spidar_uart::Counters;
 
-/// From report to report.
-const PERIOD: Duration = Duration::from_millis(1);
-/// Where in the millisecond a report goes out: just after the device's loop.
-const PHASE: Duration = Duration::from_micros(350);
 /// A report that is not there by then is none.
 const ANSWER_WITHIN: Duration = Duration::from_millis(3);
 /// Reports that are read in one period.
@@ -27,33 +24,18 @@ const SETTLE: Duration = Duration::from_millis(50);
 /// Without a believed report for this long the board is opened anew.
 const GIVEN_UP: Duration = Duration::from_millis(300);
 
-/// Why there is no board.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum WoodenError {
-    /// It cannot be opened.
-    #[error(
-        "no WoodenHaptics board can be opened ({0}); plug it in, or let your user read it: echo 'KERNEL==\"hidraw*\", ATTRS{{idVendor}}==\"16c0\", MODE=\"0660\", TAG+=\"uaccess\"' | sudo tee /etc/udev/rules.d/70-taut-wooden.rules, then plug it in anew"
-    )]
-    Line(String),
-    /// No thread.
-    #[error(
-        "cannot start a thread for the WoodenHaptics board: {0}; end other programs or raise the limit"
-    )]
-    Thread(String),
-}
-
 /// Opens the board at `path`, or the first on USB, and sets its counters: the arm is taken to be at its home. `priority` asks for real time, 0 does not.
 ///
 /// # Errors
-/// [`WoodenError`].
+/// There is no such board, or no thread.
 pub(crate) fn start(
     path: Option<PathBuf>,
     model: WoodenModel,
     priority: u8,
-) -> Result<ArmThread, WoodenError> {
-    let mut line = open(path.as_deref()).map_err(WoodenError::Line)?;
+) -> Result<ArmThread, InputError> {
+    let mut line = open(path.as_deref()).map_err(InputError::Wooden)?;
     line.write(&HostReport::SetCounters(model.home).bytes())
-        .map_err(WoodenError::Line)?;
+        .map_err(InputError::Wooden)?;
     tracing::info!("calibrated: the arm was taken to be at its home");
     let talker = Talker {
         path,
@@ -63,8 +45,12 @@ pub(crate) fn start(
         encoders: model.home,
         before: None,
     };
-    let thread = WireThread::start("taut-wooden", priority, talker);
-    thread.map_err(|error| WoodenError::Thread(error.to_string()))
+    Ok(WireThread::start(
+        "taut-wooden",
+        "the WoodenHaptics board",
+        priority,
+        talker,
+    )?)
 }
 
 /// The thread's own.
@@ -106,7 +92,7 @@ impl Wire for Talker {
 impl Talker {
     fn turn(&mut self, board: &mut dyn ReportLine, line: &mut ArmLine) -> Result<(), String> {
         let mut believed = monotonic_now();
-        let mut ticker = Ticker::at_phase(PERIOD, PHASE);
+        let mut ticker = ticker();
         while !line.is_over() {
             ticker.wait();
             let force = line.command_if(monotonic_now(), line.state.is_usable);

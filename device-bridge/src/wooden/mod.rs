@@ -19,7 +19,6 @@ mod simulated;
 #[cfg(feature = "hid")]
 pub(crate) use line::is_board;
 
-pub use board::WoodenError;
 pub(crate) use board::start;
 pub use kinematics::{MODELS as WOODEN_MODELS, WoodenModel};
 pub use line::{ReportLine, SocketLine};
