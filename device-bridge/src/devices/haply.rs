@@ -15,9 +15,9 @@ use crate::devices::Anchor;
 use crate::devices::arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
 use crate::devices::wire_thread::ArmThread;
 use crate::haply::{
-    self, EVENTS_PORT, ExchangeSettings, HaplyError, ServiceAddress, ServiceEvents,
-    workspace_centre,
+    self, EVENTS_PORT, ExchangeSettings, HaplyError, ServiceAddress, workspace_centre,
 };
+use crate::own_thread::OwnThread;
 use crate::placement::Placement;
 
 /// The client's messages, and the loop around them, Hz.
@@ -71,7 +71,7 @@ pub struct HaplySettings {
 /// The client, and who listens beside it: dropped in this order, so that the force goes first.
 struct Connected {
     client: ArmThread,
-    _events: Option<ServiceEvents>,
+    _events: Option<OwnThread>,
 }
 
 impl HaplySettings {
@@ -96,7 +96,7 @@ impl HaplySettings {
         let client = haply::start(self.address.clone(), self.exchange.clone(), priority)?;
         let events = self.events_port.map(|port| {
             // Without the thread nothing is told, and all else goes on.
-            ServiceEvents::listen(&self.address.host, port).ok()
+            haply::listen(&self.address.host, port).ok()
         });
         let port = Connected {
             client,

@@ -3,31 +3,25 @@
 //! What keeps a force from outliving its reason, beside what [`WireThread`] does: the service renders a force for its message alone; one that does not
 //! answer is told zero, and given up 100 ms later; the last message of a connection says zero.
 
-use std::net::{TcpStream, ToSocketAddrs};
 use std::thread;
 use std::time::Duration;
 
-use tungstenite::protocol::WebSocketConfig;
-use tungstenite::{Message, WebSocket};
+use tungstenite::Message;
 
 use super::exchange::{Exchange, ExchangeSettings, Unusable, question};
 use super::message::{MessageError, Said};
-use super::version::{VersionError, service_version};
+use super::socket::{GREETING_WITHIN, Socket, connect, is_late};
+use super::version::{VersionError, check_version};
 use crate::devices::ArmState;
-use crate::devices::wire_thread::{ArmLine, ArmThread, Wire, WireThread};
-use crate::realtime::{Ticker, monotonic_now};
+use crate::devices::wire_thread::{ArmLine, ArmThread, PERIOD, Wire, WireThread, ticker};
+use crate::own_thread::ThreadError;
+use crate::realtime::monotonic_now;
 use taut_kinds::ServiceAddress;
 
-/// From message to message.
-const PERIOD: Duration = Duration::from_millis(1);
-/// Where in the millisecond a message goes out: just after the device's loop, whose force it carries.
-const PHASE: Duration = Duration::from_micros(350);
 /// An answer that takes longer makes the next message one without force.
 const ANSWER_WITHIN: Duration = Duration::from_millis(20);
 /// An answer that takes longer than this many times [`ANSWER_WITHIN`] ends the connection.
 const WAITS: u32 = 5;
-/// Until the service has taken the connection and told its inventory.
-const GREETING_WITHIN: Duration = Duration::from_secs(1);
 /// Largest message that is taken, bytes.
 const MAX_MESSAGE: usize = 1 << 20;
 /// Messages that say nothing sensible, one after the other, that end a connection.
@@ -41,22 +35,15 @@ const LOOKS: usize = 200;
 pub enum HaplyError {
     /// No connection.
     #[error(
-        "no Inverse service answers at {address} ({cause}); start it (on Ubuntu: systemctl start haply-inverse-service), or name another by haply=HOST:PORT; `taut simulate-device haply` is one without a device"
+        "no Inverse service answers at {0} ({1}); start it (on Ubuntu: systemctl start haply-inverse-service), or name another by haply=HOST:PORT; `taut simulate-device haply` is one without a device"
     )]
-    NoService {
-        /// Where it was looked for.
-        address: ServiceAddress,
-        /// What the system says.
-        cause: String,
-    },
+    NoService(ServiceAddress, String),
     /// Too old.
     #[error(transparent)]
     Version(#[from] VersionError),
     /// No thread.
-    #[error(
-        "cannot start a thread for the Inverse service: {0}; end other programs or raise the limit"
-    )]
-    Thread(std::io::Error),
+    #[error(transparent)]
+    Thread(#[from] ThreadError),
 }
 
 /// Why a connection ended.
@@ -66,10 +53,6 @@ enum Lost {
     Socket(#[from] std::io::Error),
     #[error("{0}")]
     WebSocket(#[from] Box<tungstenite::Error>),
-    #[error("it is no WebSocket: {0}")]
-    Handshake(String),
-    #[error("it has no address")]
-    NoAddress,
     #[error("it has not answered for {} ms", (ANSWER_WITHIN * WAITS).as_millis())]
     NoAnswer,
     #[error("it told no inventory within {} s", GREETING_WITHIN.as_secs())]
@@ -101,13 +84,11 @@ pub(crate) fn start(
     settings: ExchangeSettings,
     priority: u8,
 ) -> Result<ArmThread, HaplyError> {
-    let first = connect(&address).map_err(|lost| HaplyError::NoService {
-        address: address.clone(),
-        cause: lost.to_string(),
-    })?;
-    match service_version(&address) {
-        Ok(_) => {}
-        Err(error @ VersionError::TooOld { .. }) => return Err(error.into()),
+    let first = connect(&address, ANSWER_WITHIN, MAX_MESSAGE)
+        .map_err(|cause| HaplyError::NoService(address.clone(), cause.to_string()))?;
+    match check_version(&address) {
+        Ok(()) => {}
+        Err(error @ VersionError::TooOld(..)) => return Err(error.into()),
         Err(unknown) => tracing::warn!("{unknown}; one before 3.5 would render no force"),
     }
     let talker = Talker {
@@ -115,10 +96,13 @@ pub(crate) fn start(
         exchange: Exchange::new(settings),
         opened: Some(first),
     };
-    WireThread::start("taut-haply", priority, talker).map_err(HaplyError::Thread)
+    Ok(WireThread::start(
+        "taut-haply",
+        "the Inverse service",
+        priority,
+        talker,
+    )?)
 }
-
-type Socket = WebSocket<TcpStream>;
 
 /// The thread's own.
 struct Talker {
@@ -139,7 +123,8 @@ impl Wire for Talker {
 
     fn session(&mut self, line: &mut ArmLine) -> Result<(), Lost> {
         let opened = self.opened.take();
-        let mut socket = opened.map_or_else(|| connect(&self.address), Ok)?;
+        let connect = || connect(&self.address, ANSWER_WITHIN, MAX_MESSAGE);
+        let mut socket = opened.map_or_else(connect, Ok)?;
         self.exchange.begin();
         let ended = self.speak(&mut socket, line);
         line.state = *self.exchange.state();
@@ -158,7 +143,7 @@ impl Talker {
         tracing::info!("speaking to the Inverse service at {}", self.address);
         let mut why = None;
         let mut nonsense = 0;
-        let mut ticker = Ticker::at_phase(PERIOD, PHASE);
+        let mut ticker = ticker();
         while !line.is_over() {
             ticker.wait();
             drain(socket)?;
@@ -237,15 +222,13 @@ pub struct HaplyFound {
 /// # Errors
 /// [`HaplyError`]: nobody answers, or too old a service.
 pub fn look(address: &ServiceAddress) -> Result<HaplyFound, HaplyError> {
-    let gone = |lost: Lost| HaplyError::NoService {
-        address: address.clone(),
-        cause: lost.to_string(),
-    };
-    let mut socket = connect(address).map_err(gone)?;
-    if let Err(error @ VersionError::TooOld { .. }) = service_version(address) {
+    let gone = |lost: Lost| HaplyError::NoService(address.clone(), lost.to_string());
+    let connected = connect(address, ANSWER_WITHIN, MAX_MESSAGE);
+    let mut socket = connected.map_err(|cause| gone(cause.into()))?;
+    if let Err(error @ VersionError::TooOld(..)) = check_version(address) {
         return Err(error.into());
     }
-    let measured = || {
+    let mut measured = || {
         let greeting = next_text(&mut socket)?.ok_or(Lost::NoInventory)?;
         let said = Said::parse(&greeting).map_err(Lost::Nonsense)?;
         let question = question(&said);
@@ -262,7 +245,6 @@ pub fn look(address: &ServiceAddress) -> Result<HaplyFound, HaplyError> {
         let _ = socket.close(None); // it is dropped either way
         Ok(HaplyFound { said, answers })
     };
-    let mut measured = measured;
     measured().map_err(gone)
 }
 
@@ -272,31 +254,6 @@ fn said_last(socket: &mut Socket, exchange: &mut Exchange) {
     if send(socket, zero).is_ok() {
         let _ = socket.close(None); // gone as well either way
         let _ = socket.flush();
-    }
-}
-
-fn connect(address: &ServiceAddress) -> Result<Socket, Lost> {
-    let mut last = Lost::NoAddress;
-    for at in (address.host.trim_matches(['[', ']']), address.port).to_socket_addrs()? {
-        match TcpStream::connect_timeout(&at, GREETING_WITHIN) {
-            Ok(stream) => return greet(stream, address),
-            Err(error) => last = error.into(),
-        }
-    }
-    Err(last)
-}
-
-fn greet(stream: TcpStream, address: &ServiceAddress) -> Result<Socket, Lost> {
-    stream.set_nodelay(true)?;
-    stream.set_read_timeout(Some(GREETING_WITHIN))?;
-    stream.set_write_timeout(Some(ANSWER_WITHIN))?;
-    let config = WebSocketConfig::default()
-        .max_message_size(Some(MAX_MESSAGE))
-        .max_frame_size(Some(MAX_MESSAGE));
-    let request = format!("ws://{address}/");
-    match tungstenite::client::client_with_config(request, stream, Some(config)) {
-        Ok((socket, _)) => Ok(socket),
-        Err(error) => Err(Lost::Handshake(error.to_string())),
     }
 }
 
@@ -333,12 +290,4 @@ fn drain(socket: &mut Socket) -> Result<(), Lost> {
     }
     socket.get_ref().set_nonblocking(false)?;
     drained
-}
-
-/// Nothing came within the time of a read.
-pub(super) fn is_late(error: &std::io::Error) -> bool {
-    matches!(
-        error.kind(),
-        std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
-    )
 }

@@ -6,17 +6,15 @@
 //! Source: the vendor's client `haply` 1.3.1, read for facts: `{"name", "data", "category", "level", "message"}`, names in kebab case.
 
 use std::fmt::Write as _;
-use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
 use serde::Deserialize;
 use taut_kinds::ServiceAddress;
-use tungstenite::protocol::WebSocketConfig;
-use tungstenite::{Message, WebSocket};
+use tungstenite::Message;
 
-use super::client::is_late;
+use super::socket::{GREETING_WITHIN, Socket, connect, is_late};
 use crate::own_thread::OwnThread;
 use crate::realtime::monotonic_now;
 
@@ -36,8 +34,6 @@ const MAX_NONSENSE: u32 = 20;
 const RETRY: Duration = Duration::from_secs(2);
 /// Between two looks whether it is over.
 const LOOK: Duration = Duration::from_millis(50);
-/// For the connection and its handshake.
-const GREETING_WITHIN: Duration = Duration::from_secs(1);
 
 /// How much it matters, as the service says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -132,29 +128,21 @@ impl LineLimit {
     }
 }
 
-/// The thread that listens. Dropping it ends it.
-pub(crate) struct ServiceEvents {
-    _thread: OwnThread,
+/// Listens to the service on this host and port. Dropping the thread ends it.
+pub(crate) fn listen(host: &str, port: u16) -> std::io::Result<OwnThread> {
+    listen_with(host, port, tell)
 }
 
-impl ServiceEvents {
-    /// Listens to the service on this host and port.
-    pub(crate) fn listen(host: &str, port: u16) -> std::io::Result<Self> {
-        Self::listen_with(host, port, tell)
-    }
-
-    fn listen_with(
-        host: &str,
-        port: u16,
-        tell: impl Fn(tracing::Level, &str) + Send + 'static,
-    ) -> std::io::Result<Self> {
-        let address = ServiceAddress {
-            host: host.to_owned(),
-            port,
-        };
-        let thread = OwnThread::start("taut-haply-events", move |end| run(&address, end, &tell))?;
-        Ok(Self { _thread: thread })
-    }
+fn listen_with(
+    host: &str,
+    port: u16,
+    tell: impl Fn(tracing::Level, &str) + Send + 'static,
+) -> std::io::Result<OwnThread> {
+    let address = ServiceAddress {
+        host: host.to_owned(),
+        port,
+    };
+    OwnThread::start("taut-haply-events", move |end| run(&address, end, &tell))
 }
 
 fn tell(level: tracing::Level, line: &str) {
@@ -170,7 +158,10 @@ fn run(address: &ServiceAddress, end: &AtomicBool, tell: &dyn Fn(tracing::Level,
     let is_over = || end.load(Ordering::Relaxed);
     let mut limit = LineLimit::default();
     while !is_over() {
-        if let Some(mut socket) = connect(address) {
+        let connected = connect(address, GREETING_WITHIN, MAX_MESSAGE);
+        if let Ok(mut socket) = connected
+            && socket.get_ref().set_read_timeout(Some(LOOK)).is_ok()
+        {
             tracing::debug!("listening to the events of the Inverse service at {address}");
             hear(&mut socket, end, &mut limit, tell);
         }
@@ -181,26 +172,9 @@ fn run(address: &ServiceAddress, end: &AtomicBool, tell: &dyn Fn(tracing::Level,
     }
 }
 
-fn connect(address: &ServiceAddress) -> Option<WebSocket<TcpStream>> {
-    let places = (address.host.trim_matches(['[', ']']), address.port).to_socket_addrs();
-    let stream = places
-        .ok()?
-        .find_map(|at| TcpStream::connect_timeout(&at, GREETING_WITHIN).ok())?;
-    stream.set_read_timeout(Some(GREETING_WITHIN)).ok()?;
-    stream.set_write_timeout(Some(GREETING_WITHIN)).ok()?;
-    let config = WebSocketConfig::default()
-        .max_message_size(Some(MAX_MESSAGE))
-        .max_frame_size(Some(MAX_MESSAGE));
-    let request = format!("ws://{address}/");
-    let (socket, _) =
-        tungstenite::client::client_with_config(request, stream, Some(config)).ok()?;
-    socket.get_ref().set_read_timeout(Some(LOOK)).ok()?;
-    Some(socket)
-}
-
 /// Until the end, or until the connection is gone or says nothing sensible.
 fn hear(
-    socket: &mut WebSocket<TcpStream>,
+    socket: &mut Socket,
     end: &AtomicBool,
     limit: &mut LineLimit,
     tell: &dyn Fn(tracing::Level, &str),
@@ -332,7 +306,7 @@ mod tests {
             vec![CONNECTED.to_owned()],
         ]);
         let (lines, heard) = channel();
-        let events = ServiceEvents::listen_with("127.0.0.1", port, move |_, line: &str| {
+        let events = listen_with("127.0.0.1", port, move |_, line: &str| {
             let _ = lines.send(line.to_owned());
         });
         let patience = Duration::from_secs(60);

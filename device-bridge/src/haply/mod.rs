@@ -9,6 +9,7 @@
 //! | `exchange.rs`  | one connection without sockets: which device, which grip, what is next |
 //! | `client.rs`    | the thread: sockets, the millisecond's beat, another connection        |
 //! | `events.rs`    | what the service tells of itself on a second socket                   |
+//! | `socket.rs`    | a connection to the service: either socket's                          |
 //! | `version.rs`   | which service is there: 3.5 or later                                  |
 //! | `simulated.rs` | the service's side without sockets: device, hand and grip simulated    |
 //! | `service.rs`   | the same on a socket                                                  |
@@ -22,16 +23,16 @@ mod exchange;
 mod message;
 mod service;
 mod simulated;
+mod socket;
 mod version;
 
 pub(crate) use client::start;
 pub use client::{HaplyError, HaplyFound, look};
 pub use events::EVENTS_PORT;
-pub(crate) use events::ServiceEvents;
+pub(crate) use events::listen;
 pub use exchange::{Exchange, ExchangeSettings, Unusable};
 pub use message::{Arm, GripKind, GripSaid, MessageError, Said};
 pub use service::{HaplyService, ServiceTotals};
 pub(crate) use simulated::workspace_centre;
 pub use simulated::{SimulatedInverse, SimulatedSettings};
 pub use taut_kinds::ServiceAddress;
-pub use version::{ServiceVersion, VersionError, service_version};

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use tungstenite::Message;
 
-use super::client::is_late;
 use super::simulated::SimulatedInverse;
+use super::socket::is_late;
 use crate::own_thread::OwnThread;
 use crate::realtime::monotonic_now;
 

@@ -1,49 +1,33 @@
 //! Which service is there. Before 3.5 the fields of a force had other names, so that an old service would take it for none.
 
+use std::fmt::{Display, Formatter};
 use std::time::Duration;
 
 use serde::Deserialize;
-
 use taut_kinds::ServiceAddress;
 
 /// The first whose messages are understood.
-const FIRST: ServiceVersion = ServiceVersion { major: 3, minor: 5 };
+const FIRST: ServiceVersion = ServiceVersion(3, 5);
 /// How long the answer may take.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Largest answer that is read, bytes.
 const MAX_ANSWER: u64 = 1 << 16;
 
-/// Version of an Inverse service.
+/// The first two numbers of an Inverse service's version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct ServiceVersion {
-    /// Before the first point.
-    pub major: u32,
-    /// After it.
-    pub minor: u32,
-}
+pub struct ServiceVersion(u32, u32);
 
 /// Why no version is known, or which one is too old.
 #[derive(Debug, thiserror::Error)]
 pub enum VersionError {
     /// Too old.
     #[error(
-        "the Inverse service at {address} has version {}.{}, but its messages are understood from {}.{} on; install a newer one",
-        found.major, found.minor, FIRST.major, FIRST.minor
+        "the Inverse service at {0} has version {1}, but its messages are understood from {FIRST} on; install a newer one"
     )]
-    TooOld {
-        /// Of the service.
-        address: ServiceAddress,
-        /// What it says.
-        found: ServiceVersion,
-    },
+    TooOld(ServiceAddress, ServiceVersion),
     /// No answer, or one that says no version.
-    #[error("the Inverse service at {address} does not tell its version ({cause})")]
-    Unknown {
-        /// Of the service.
-        address: ServiceAddress,
-        /// What went wrong.
-        cause: String,
-    },
+    #[error("the Inverse service at {0} does not tell its version ({1})")]
+    Unknown(ServiceAddress, String),
 }
 
 #[derive(Deserialize)]
@@ -52,14 +36,17 @@ struct Answer {
 }
 
 impl ServiceVersion {
-    /// The first two numbers of a text such as `3.5.1.0`.
-    #[must_use]
-    pub fn parse(text: &str) -> Option<Self> {
+    /// Of a text such as `3.5.1.0`.
+    fn parse(text: &str) -> Option<Self> {
         let mut numbers = text.trim_start_matches('v').split(['.', '-', '+']);
-        Some(Self {
-            major: numbers.next()?.parse().ok()?,
-            minor: numbers.next()?.parse().ok()?,
-        })
+        let mut number = || numbers.next()?.parse().ok();
+        Some(Self(number()?, number()?))
+    }
+}
+
+impl Display for ServiceVersion {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}.{}", self.0, self.1)
     }
 }
 
@@ -67,11 +54,8 @@ impl ServiceVersion {
 ///
 /// # Errors
 /// [`VersionError`].
-pub fn service_version(address: &ServiceAddress) -> Result<ServiceVersion, VersionError> {
-    let unknown = |cause: String| VersionError::Unknown {
-        address: address.clone(),
-        cause,
-    };
+pub(super) fn check_version(address: &ServiceAddress) -> Result<(), VersionError> {
+    let unknown = |cause: String| VersionError::Unknown(address.clone(), cause);
     let agent: ureq::Agent = ureq::Agent::config_builder()
         .timeout_global(Some(PATIENCE))
         .proxy(None)
@@ -89,12 +73,9 @@ pub fn service_version(address: &ServiceAddress) -> Result<ServiceVersion, Versi
     let found = ServiceVersion::parse(&answer.project_version)
         .ok_or_else(|| unknown(format!("`{}` is none", answer.project_version)))?;
     if found < FIRST {
-        return Err(VersionError::TooOld {
-            address: address.clone(),
-            found,
-        });
+        return Err(VersionError::TooOld(address.clone(), found));
     }
-    Ok(found)
+    Ok(())
 }
 
 #[cfg(test)]

@@ -87,9 +87,7 @@ fn inverse_service(service: &ServiceAddress) -> Finding {
             "plug the arm in, with its power supply",
         ),
         Ok(found) => Finding::good(WHAT, of_service(service, &found)),
-        Err(HaplyError::NoService { .. }) => {
-            Finding::good(WHAT, format!("none answers at {service}"))
-        }
+        Err(HaplyError::NoService(..)) => Finding::good(WHAT, format!("none answers at {service}")),
         Err(error) => Finding::lacking(WHAT, error.to_string(), "install a newer Inverse service"),
     }
 }
