@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
-use crate::support::floor::{Dice, OnFloor, floor, ms, wait_until};
-use crate::support::stage::{Faults, HANGS, Inside, UNPLUGGED, VICE, no_write_jumps};
+use crate::support::floor::{Dice, OnFloor, floor};
+use crate::support::stage::{BAD_LINE, Faults, HANGS, Inside, UNPLUGGED, VICE, no_write_jumps};
+use crate::support::{ms, wait_until};
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3, Vector6};
 use taut_bridge::haply::{
     Exchange, ExchangeSettings, HaplyService, ServiceAddress, SimulatedInverse, SimulatedSettings,
@@ -125,11 +126,7 @@ fn no_message_to_the_arm_jumps() {
     let choice = format!("haply={}", service.address());
     let faults = Faults {
         modes: &[HANGS, UNPLUGGED],
-        ticks: &[1, 3, 10, 30, 100],
-        floor: 0.003,
-        allowed: 510_000,
-        keeps_force: false,
-        patience: ms(1000),
+        ..BAD_LINE
     };
     no_write_jumps(&choice, &Sometimes(service), &faults);
 }

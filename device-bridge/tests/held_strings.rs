@@ -10,6 +10,8 @@ use taut_bridge::{
 };
 use taut_spidar::{Encoders, Geometry, Reading, StringFault, StringHardware, StringLosses};
 
+use crate::support::ms;
+
 /// G in the body's frame, off the grip's centre on purpose.
 fn reference_point() -> Point3<f64> {
     Point3::new(0.004, -0.003, 0.002)
@@ -36,10 +38,6 @@ fn held(name: &str, hand: Hand, path: MinJerkPath) -> SpidarDevice<HeldStrings> 
     let geometry = string_geometry(name).unwrap_or_else(|error| panic!("{error}"));
     let made = simulated_spidar(geometry, turned(), reference_point(), hand, path, None);
     made.unwrap_or_else(|error| panic!("{error}")).device
-}
-
-fn ms(time: u64) -> Duration {
-    Duration::from_millis(time)
 }
 
 #[test]

@@ -10,9 +10,10 @@ use taut_bridge::Device;
 
 use crate::plugin::{Loaded, built, document, here, stand_in};
 use crate::support::stage::{
-    GOOD, HANGS, Inside, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, PATIENCE, TOO_HOT, UNPLUGGED,
-    goes_wrong, ms, opened,
+    GOOD, HANGS, Inside, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, TOO_HOT, UNPLUGGED, goes_wrong,
+    opened,
 };
+use crate::support::{PATIENCE, ms};
 
 /// The plug-in of this name, built by the line of the document as a user types it in the repository, and chosen without options; beside it `strict.so`, the
 /// same source with every warning an error.

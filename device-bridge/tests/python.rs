@@ -9,9 +9,10 @@ use std::time::Instant;
 use taut_bridge::{DeviceFault, Rearm};
 use tempfile::TempDir;
 
+use crate::support::PATIENCE;
 use crate::support::stage::{
-    BAD_SAMPLES, FAULTS, GOOD, HANGS, Inside, PATIENCE, Stage, a_person_arms, goes_wrong,
-    is_a_whole_hand, no_write_jumps, opened,
+    BAD_SAMPLES, FAULTS, GOOD, HANGS, Inside, Stage, a_person_arms, goes_wrong, is_a_whole_hand,
+    no_write_jumps, opened,
 };
 
 // Of tests/python/hand.py.

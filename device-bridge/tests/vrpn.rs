@@ -7,12 +7,11 @@ use std::net::{Ipv4Addr, SocketAddrV4, TcpListener, TcpStream, UdpSocket};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::support::PATIENCE;
 use taut_bridge::{TrackerFeed, TrackerState, VrpnMode, VrpnSource};
 use taut_vrpn::message::{Header, append, first};
 use taut_vrpn::{ButtonStates, PoseReport, cookie, description};
 
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
 const POSE: i32 = 4;
 const STATES: i32 = 5;
 const PONG: i32 = 6;

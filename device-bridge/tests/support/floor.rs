@@ -10,11 +10,7 @@ use taut_bridge::{
     SafetySettings,
 };
 
-use super::PATIENCE;
-
-pub fn ms(time: u64) -> Duration {
-    Duration::from_millis(time)
-}
+use super::{PATIENCE, ms};
 
 /// A device whose port ticks on a floor.
 pub struct OnFloor {
@@ -103,14 +99,6 @@ impl OnFloor {
     }
 }
 
-pub fn wait_until(what: &str, done: impl Fn() -> bool) {
-    let begun = Instant::now();
-    while !done() {
-        assert!(begun.elapsed() < PATIENCE, "{what}");
-        thread::sleep(ms(1));
-    }
-}
-
 /// A linear congruential generator: the same damage each time.
 pub struct Dice(pub u64);
 
@@ -123,17 +111,47 @@ impl Dice {
         (self.0 >> 33) % sides
     }
 
-    /// Nothing, what came before it, a beginning, a bit changed, or a byte less.
-    pub fn damage(&mut self, bytes: &mut Vec<u8>, before: &[u8]) {
+    /// Nothing, what came before it, a beginning, a bit changed, a byte twice, or a byte less.
+    fn damage(&mut self, bytes: &mut Vec<u8>, before: &[u8]) {
         let at = self.roll(bytes.len() as u64) as usize;
-        match self.roll(5) {
+        match self.roll(6) {
             0 => bytes.clear(),
             1 => *bytes = before.to_vec(),
             2 => bytes.truncate(at),
             3 => bytes[at] ^= 1 << self.roll(8),
+            4 => bytes.insert(at, bytes[at]),
             _ => drop(bytes.remove(at)),
         }
     }
+}
+
+/// Damages one in ten of a device's answers, one each millisecond: how many were damaged, and how many of these `is_believed`, which is given the time and
+/// what is heard, and sees to it that no wrong pose is.
+pub fn damaged(
+    answers: u64,
+    answer: impl Fn(u64) -> Vec<u8>,
+    mut is_believed: impl FnMut(u64, &[u8]) -> bool,
+) -> (u64, u64) {
+    let mut dice = Dice(5);
+    let (mut damaged, mut believed, mut good) = (0, 0, 0);
+    let mut before = Vec::new();
+    for time in 0..answers {
+        let whole = answer(time);
+        let mut heard = whole.clone();
+        let is_damaged = dice.roll(10) == 0;
+        if is_damaged {
+            damaged += 1;
+            dice.damage(&mut heard, &before);
+        }
+        before = whole;
+        if is_believed(time, &heard) {
+            good += 1;
+            believed += u64::from(is_damaged);
+        }
+    }
+    assert!(good > answers * 8 / 10, "{good} of {answers}");
+    assert!(damaged > answers / 20, "{damaged}");
+    (damaged, believed)
 }
 
 /// The scene's axes are the device's.

@@ -27,6 +27,18 @@ pub const STIFFNESS: f64 = 500.0;
 /// Only a hang takes this long.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
+pub const fn ms(time: u64) -> Duration {
+    Duration::from_millis(time)
+}
+
+pub fn wait_until(what: &str, done: impl Fn() -> bool) {
+    let begun = Instant::now();
+    while !done() {
+        assert!(begun.elapsed() < PATIENCE, "{what}");
+        thread::sleep(ms(1));
+    }
+}
+
 fn content() -> Content {
     let corners = vec![
         [0.0; 3],
@@ -168,11 +180,9 @@ impl Workbench {
     /// Waits until the server has taken `count` device readings.
     pub fn wait_for_inputs(&self, count: u64) {
         let link = self.link.as_ref().expect("running");
-        let begun = Instant::now();
-        while link.counters().inputs < count {
-            assert!(begun.elapsed() < PATIENCE, "no device readings arrive");
-            thread::sleep(Duration::from_millis(10));
-        }
+        wait_until("no device readings arrive", || {
+            link.counters().inputs >= count
+        });
     }
 
     /// Waits until the hand has rested within `heights` (m) for `readings` in a row.

@@ -9,8 +9,7 @@ use taut_bridge::{
     Placement, Pose, Rearm, SafetySettings,
 };
 
-/// Only a hang takes this long.
-pub const PATIENCE: Duration = Duration::from_secs(60);
+use super::{PATIENCE, ms, wait_until};
 
 // Of tests/plugin_c/plant.h.
 pub const GOOD: i64 = 0;
@@ -40,16 +39,8 @@ pub trait Inside {
     fn set(&self, name: &str, value: i64);
 
     fn wait(&self, what: &str, done: &dyn Fn() -> bool) {
-        let begun = Instant::now();
-        while !done() {
-            assert!(begun.elapsed() < PATIENCE, "{what}");
-            thread::sleep(ms(1));
-        }
+        wait_until(what, done);
     }
-}
-
-pub fn ms(time: u64) -> Duration {
-    Duration::from_millis(time)
 }
 
 pub fn opened(choice: &str) -> Result<Box<dyn Device>, String> {
@@ -305,6 +296,16 @@ pub const BAD_SAMPLES: Faults = Faults {
     allowed: 510_000,
     keeps_force: true,
     patience: PATIENCE,
+};
+
+/// A line that hangs or answers what is no answer.
+pub const BAD_LINE: Faults = Faults {
+    modes: &[HANGS, NOT_A_NUMBER],
+    ticks: &[1, 3, 10, 30, 100],
+    floor: 0.003,
+    allowed: 510_000,
+    keeps_force: false,
+    patience: ms(1000),
 };
 
 /// Real time for a driver, as `taut bridge` asks for it: a driver that stands for 50 ms between taking a command and writing it writes for a hand that
