@@ -348,13 +348,10 @@ mod tests {
     use crate::device::{Device, Pose};
     use crate::devices::{AtEnd, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice};
     use crate::edge::{floor, offer};
+    use crate::ms;
     use crate::port::{EventKind, SafetySettings};
     use nalgebra::Point3;
     use taut_recording::TraceSample;
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
-    }
 
     fn bridge(device: impl Device + 'static) -> BridgeLoop {
         BridgeLoop::new(DevicePort::new(

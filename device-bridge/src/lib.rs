@@ -96,3 +96,9 @@ pub use simulated_strings::{SimulatedSpidar, StringsError, simulated_spidar, str
 pub use taut_recording::TraceSample;
 pub use trace_file::{TraceFileError, read_trace, via_points};
 pub use vrpn::{TrackerFeed, TrackerState, UnknownVrpnMode, VrpnMode, VrpnSource};
+
+/// A time of a test.
+#[cfg(test)]
+pub(crate) const fn ms(time: u64) -> std::time::Duration {
+    std::time::Duration::from_millis(time)
+}

@@ -59,12 +59,9 @@ impl OwnStamps {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ms;
 
     const MS: u64 = 1_000_000;
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
-    }
 
     fn session(ns: u64) -> Option<SessionTime> {
         Some(SessionTime {

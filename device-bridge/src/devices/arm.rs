@@ -270,6 +270,7 @@ mod tests {
 
     use super::*;
     use crate::devices::PolhemSettings;
+    use crate::ms;
     use crate::port::{ArmingState, Command, DevicePort, SafetySettings};
 
     /// Says what a test wants.
@@ -281,10 +282,6 @@ mod tests {
         }
 
         fn push(&mut self, _force: [f64; 3]) {}
-    }
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
     }
 
     fn arm() -> (Arc<Mutex<ArmState>>, ArmDevice) {

@@ -89,11 +89,8 @@ impl Glide {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ms;
     use proptest::prelude::*;
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
-    }
 
     #[test]
     fn an_even_motion_comes_out_even_one_and_a_half_intervals_late() {

@@ -207,6 +207,7 @@ fn nanoseconds(time: Duration) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ms;
     use taut_link::proto::{InputSample, PoseF64};
 
     type Inputs = triple_buffer::Input<Option<DeviceInput>>;
@@ -217,10 +218,6 @@ mod tests {
         let (device, commands) =
             RemoteDevice::new(output, DeviceLimits::UNLIMITED, DEFAULT_MAX_AGE);
         (inputs, device, commands)
-    }
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
     }
 
     fn input(measured_ms: u64, received_ms: u64) -> DeviceInput {

@@ -186,6 +186,7 @@ impl Device for VrpnDevice {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ms;
     use nalgebra::{Point3, Similarity3, Vector3};
     use std::sync::{Arc, Mutex};
     use taut_vrpn::PoseReport;
@@ -237,10 +238,6 @@ mod tests {
         };
         let device = VrpnDevice::new(Box::new(tracker.clone()), &settings, placement);
         (tracker, device)
-    }
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
     }
 
     #[test]

@@ -341,6 +341,7 @@ mod tests {
     use std::sync::mpsc::{Receiver, Sender, channel};
 
     use super::*;
+    use crate::ms;
 
     /// Tells every command that it is given, and is lost once.
     struct Scripted {
@@ -398,10 +399,6 @@ mod tests {
                 return;
             }
         }
-    }
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
     }
 
     /// What is said at the millisecond that each is given with.

@@ -1,12 +1,9 @@
 use super::*;
+use crate::ms;
 use god_object::nalgebra::Vector3;
 use triple_buffer::Input;
 
 const X: f64 = 1.0;
-
-fn ms(ms: u64) -> Duration {
-    Duration::from_millis(ms)
-}
 
 fn settings() -> ExternalWrenchSettings {
     ExternalWrenchSettings {

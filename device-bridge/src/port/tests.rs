@@ -13,6 +13,7 @@ mod silence;
 
 use super::*;
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Pose};
+use crate::ms;
 
 type Answer = Result<DeviceSample, DeviceFault>;
 
@@ -52,10 +53,6 @@ struct Stage {
 const TICK: Duration = Duration::from_millis(1);
 /// Age of the last good input from which there is no force: the margin before the promise of 120 ms.
 const GONE: Duration = SafetySettings::HOLD.saturating_add(SafetySettings::RAMP_OUT);
-
-fn ms(time: u64) -> Duration {
-    Duration::from_millis(time)
-}
 
 /// Never the same twice.
 fn sample_at(now: Duration, speed: f64) -> DeviceSample {
@@ -117,6 +114,35 @@ impl Stage {
         report
     }
 
+    /// A sample in order, with a command of 10 N that was made at `made`: the force then, N.
+    fn felt_of(&mut self, made: Duration) -> f64 {
+        let sample = sample(self.now + TICK);
+        let command = Command::fresh(made, force(10.0));
+        self.tick(Ok(sample), Some(command)).wrench[0]
+    }
+
+    /// Ticks in order with these buttons held, commanded 10 N: the force then, N.
+    fn held(&mut self, ticks: u32, buttons: u16) -> f64 {
+        for _ in 0..ticks {
+            let now = self.now + TICK;
+            let held = DeviceSample {
+                buttons,
+                ..sample(now)
+            };
+            let _ = self.tick(Ok(held), Some(Command::fresh(now, force(10.0))));
+        }
+        self.port.rendered()[0]
+    }
+
+    /// Armed by a person, then asked not to be for 30 ms, and to be armed again.
+    fn asked_on_the_way_down() -> Self {
+        let mut stage = Self::armed_by_a_person();
+        stage.port.ask_to_disarm();
+        stage.good_for(ms(30), force(10.0));
+        stage.port.ask_to_arm();
+        stage
+    }
+
     /// A tick with everything in order.
     fn good(&mut self, wrench: Vector6<f64>) -> TickReport {
         let now = self.now + self.period;
@@ -176,10 +202,7 @@ fn a_stalled_port_drops_the_force_by_the_slew_limit() {
     stage.now += ms(5000);
     let mut before = 10.0;
     for _ in 0..20 {
-        let now = stage.now + TICK;
-        let felt = stage
-            .tick(Ok(sample(now)), Some(Command::fresh(last, force(10.0))))
-            .wrench[0];
+        let felt = stage.felt_of(last);
         // The first write uses up 2 ms, not five seconds.
         let most = if before == 10.0 { 1.0 } else { 0.5 };
         assert!(before - felt <= most + 1e-9);

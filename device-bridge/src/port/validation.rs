@@ -265,11 +265,8 @@ pub(super) fn at_rest(pose: &Pose) -> DeviceSample {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ms;
     use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
-    }
 
     fn check() -> SampleCheck {
         SampleCheck::new(ValidationSettings::default(), Point3::origin(), ms(1))

@@ -142,11 +142,8 @@ fn longest_in_full(settings: &SafetySettings) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ms;
     use nalgebra::Vector6;
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
-    }
 
     fn at(now_ms: u64, made_ms: u64, constraint_age_ms: u64) -> Freshness {
         let command = Command {

@@ -152,10 +152,7 @@ fn changes(from: &[i16; STRINGS], to: &[i16; STRINGS]) -> [i32; STRINGS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn ms(time: u64) -> Duration {
-        Duration::from_millis(time)
-    }
+    use crate::ms;
 
     fn at(time: u64) -> [i16; STRINGS] {
         // 1 m/s, some 29 counts a millisecond, alternating in direction.

@@ -76,17 +76,7 @@ fn the_dead_mans_button_is_the_force() {
         ..manual()
     };
     let mut stage = Stage::new(settings);
-    let mut run = |ticks: u32, buttons: u16| {
-        for _ in 0..ticks {
-            let now = stage.now + TICK;
-            let held = DeviceSample {
-                buttons,
-                ..sample(now)
-            };
-            let _ = stage.tick(Ok(held), Some(Command::fresh(now, force(10.0))));
-        }
-        (stage.port.rendered()[0], stage.port.state())
-    };
+    let mut run = |ticks, buttons| (stage.held(ticks, buttons), stage.port.state());
     // What is held at the start was not pressed.
     assert_eq!(run(700, 0b100), (0.0, ArmingState::Disarmed));
     assert_eq!(run(10, 0), (0.0, ArmingState::Disarmed));

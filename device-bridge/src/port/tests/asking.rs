@@ -4,10 +4,7 @@ use super::*;
 
 #[test]
 fn what_is_asked_on_the_way_down_is_granted_at_its_end() {
-    let mut stage = Stage::armed_by_a_person();
-    stage.port.ask_to_disarm();
-    stage.good_for(ms(30), force(10.0));
-    stage.port.ask_to_arm();
+    let mut stage = Stage::asked_on_the_way_down();
     let mut before = stage.port.rendered()[0];
     while stage.port.state() == ArmingState::Fading {
         let felt = stage.good(force(10.0)).wrench[0];
@@ -32,22 +29,11 @@ fn a_dead_mans_button_pressed_again_at_once_brings_the_force_back() {
     // Pressed again until the end, or for a moment.
     for (again, felt) in [(700, 10.0), (20, 0.0)] {
         let mut stage = Stage::new(settings);
-        let mut run = |ticks: u32, buttons: u16| {
-            for _ in 0..ticks {
-                let now = stage.now + TICK;
-                let held = DeviceSample {
-                    buttons,
-                    ..sample(now)
-                };
-                let _ = stage.tick(Ok(held), Some(Command::fresh(now, force(10.0))));
-            }
-            stage.port.rendered()[0]
-        };
-        run(10, 0);
-        assert_eq!(run(700, 0b100), 10.0);
-        assert!(run(30, 0) > 5.0);
-        run(again, 0b100);
-        assert_eq!(run(700 - again, 0), felt, "again for {again} ms");
+        stage.held(10, 0);
+        assert_eq!(stage.held(700, 0b100), 10.0);
+        assert!(stage.held(30, 0) > 5.0);
+        stage.held(again, 0b100);
+        assert_eq!(stage.held(700 - again, 0), felt, "again for {again} ms");
         let told = stage.kinds().split_off(2);
         let expected: &[EventKind] = if felt > 0.0 {
             &[
@@ -65,10 +51,7 @@ fn a_dead_mans_button_pressed_again_at_once_brings_the_force_back() {
 #[test]
 fn what_is_asked_before_a_fault_or_a_stall_is_refused() {
     for stalls in [false, true] {
-        let mut stage = Stage::armed_by_a_person();
-        stage.port.ask_to_disarm();
-        stage.good_for(ms(30), force(10.0));
-        stage.port.ask_to_arm();
+        let mut stage = Stage::asked_on_the_way_down();
         stage.good_for(ms(10), force(10.0));
         assert_eq!(stage.kinds(), [EventKind::Disarmed]);
         if stalls {
@@ -90,10 +73,7 @@ fn what_is_asked_before_a_fault_or_a_stall_is_refused() {
 #[test]
 fn what_is_asked_before_somebody_else_commands_is_refused() {
     for source in [CommandSource::Same, CommandSource::Other] {
-        let mut stage = Stage::armed_by_a_person();
-        stage.port.ask_to_disarm();
-        stage.good_for(ms(30), force(10.0));
-        stage.port.ask_to_arm();
+        let mut stage = Stage::asked_on_the_way_down();
         stage.good_for(ms(10), force(10.0));
         stage.port.restart(source);
         stage.good_for(ms(1500), force(10.0));

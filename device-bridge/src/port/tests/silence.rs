@@ -9,10 +9,7 @@ fn silence_is_held_for_20_ms_then_gone_before_120_ms_and_ramps_in_again_by_itsel
     let last = stage.now;
     let mut before = 10.0;
     for age in 1..=300 {
-        let now = stage.now + TICK;
-        let felt = stage
-            .tick(Ok(sample(now)), Some(Command::fresh(last, force(10.0))))
-            .wrench[0];
+        let felt = stage.felt_of(last);
         match age {
             0..=20 => assert_eq!(felt, 10.0),
             21..115 => assert!(felt < before && felt > 0.0),
@@ -94,11 +91,8 @@ fn commands_ahead_of_the_clock_prolong_no_silence() {
     let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
     let last = stage.now;
     for age in 1..=200 {
-        let now = stage.now + TICK;
-        let made = if age <= 20 { last } else { now + ms(50) };
-        let felt = stage
-            .tick(Ok(sample(now)), Some(Command::fresh(made, force(10.0))))
-            .wrench[0];
+        let ahead = stage.now + TICK + ms(50);
+        let felt = stage.felt_of(if age <= 20 { last } else { ahead });
         assert_eq!(felt == 0.0, ms(age) >= GONE, "{felt} N at {age} ms");
     }
     assert_eq!(stage.kinds(), [EventKind::CommandNotOnClock]);
