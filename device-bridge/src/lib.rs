@@ -74,7 +74,7 @@ pub use devices::{
     HandPreset, HaplySettings, HeldStrings, MAX_EDGE_DELAY, MinJerkPath, Motors, PathError,
     PluginSettings, PolhemSettings, Progress, RecordedDevice, RemoteDevice, SimulatedDevice,
     SpidarDevice, SpidarPlacement, SpidarUartError, SpidarUartSettings, Trace, TraceError, Tremor,
-    TremorMotion, UnknownHand, ViaPoint, haply_limits, min_jerk, string_grip,
+    TremorMotion, UnknownHand, ViaPoint, min_jerk, string_grip,
 };
 pub use external::{
     ExternalWrench, ExternalWrenchSettings, ExternalWrenchStatistics, JudgedWrench, MAX_AHEAD,

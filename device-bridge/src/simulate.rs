@@ -8,7 +8,7 @@ use std::thread;
 use std::time::Duration;
 
 use serde::Serialize;
-use taut_plant::{MinJerkPath, Tremor};
+use taut_plant::{Hand, MinJerkPath, Tremor};
 
 use crate::console;
 use crate::devices::HandPreset;
@@ -124,9 +124,11 @@ struct PlayedHand {
 }
 
 impl PlayedHand {
-    fn path(&self) -> Result<Option<MinJerkPath>, SimulateError> {
+    /// The hand, where it goes, and its tremor.
+    fn held(&self) -> Result<(Hand, Option<MinJerkPath>, Option<Tremor>), TraceFileError> {
         let path = self.path.as_ref().map(|file| read_path(file, true));
-        Ok(path.transpose()?)
+        let tremor = Tremor::new(Tremor::TYPICAL_RMS, self.seed);
+        Ok((self.hand.into(), path.transpose()?, Some(tremor)))
     }
 }
 
@@ -233,11 +235,12 @@ fn play_until(over: impl Fn() -> bool, place: String) -> Result<(), SimulateErro
 }
 
 fn play_haply(args: &PlayedHaply, over: impl Fn() -> bool) -> Result<PlayedReport, SimulateError> {
+    let (hand, path, tremor) = args.hand.held()?;
     let settings = SimulatedSettings {
-        path: args.hand.path()?,
-        tremor: Some(Tremor::new(Tremor::TYPICAL_RMS, args.hand.seed)),
+        hand,
+        path,
+        tremor,
         with_grip: !args.no_grip,
-        ..SimulatedSettings::held(args.hand.hand.into())
     };
     let service = HaplyService::start(args.bind, SimulatedInverse::new(&settings));
     let service = service.map_err(|cause| SimulateError::Bind {
@@ -269,14 +272,8 @@ fn play_spidar(
     use crate::spidar_uart::SimulatedBoards;
 
     let geometry = crate::simulated_strings::string_geometry(&args.geometry)?;
-    let boards = SimulatedBoards::new(
-        &geometry,
-        args.hand.hand.into(),
-        args.hand.path()?,
-        Some(Tremor::new(Tremor::TYPICAL_RMS, args.hand.seed)),
-        args.one_board,
-        [0; 8],
-    )?;
+    let (hand, path, tremor) = args.hand.held()?;
+    let boards = SimulatedBoards::new(&geometry, hand, path, tremor, args.one_board, [0; 8])?;
     let terminal = PseudoTerminal::start(boards, args.link.as_deref());
     let terminal = terminal.map_err(SimulateError::Terminal)?;
     let path = terminal.place();
@@ -301,8 +298,8 @@ fn play_polhem(
     use crate::polhem::SimulatedPolhem;
     use crate::pseudo_terminal::PseudoTerminal;
 
-    let tremor = Tremor::new(Tremor::TYPICAL_RMS, args.hand.seed);
-    let arm = SimulatedPolhem::new(args.hand.hand.into(), args.hand.path()?, Some(tremor));
+    let (hand, path, tremor) = args.hand.held()?;
+    let arm = SimulatedPolhem::new(hand, path, tremor);
     let terminal = PseudoTerminal::start(arm, args.link.as_deref());
     let terminal = terminal.map_err(SimulateError::Terminal)?;
     let path = terminal.place();
@@ -315,7 +312,7 @@ fn play_polhem(
     let arm = terminal.device();
     Ok(PlayedReport::Polhem {
         lines: arm.lines(),
-        largest_force_n: arm.largest_force(),
+        largest_force_n: arm.held().largest_force(),
     })
 }
 
@@ -330,13 +327,8 @@ fn play_wooden(
 
     let model = WoodenModel::named(&args.model);
     let model = model.ok_or_else(|| SimulateError::Model(args.model.clone()))?;
-    let tremor = Tremor::new(Tremor::TYPICAL_RMS, args.hand.seed);
-    let arm = SimulatedWooden::new(
-        model,
-        args.hand.hand.into(),
-        args.hand.path()?,
-        Some(tremor),
-    );
+    let (hand, path, tremor) = args.hand.held()?;
+    let arm = SimulatedWooden::new(model, hand, path, tremor);
     let service = WoodenService::start(Arc::new(Mutex::new(arm)), &args.socket);
     let service = service.map_err(|cause| SimulateError::Socket {
         path: args.socket.clone(),
@@ -352,6 +344,6 @@ fn play_wooden(
     let arm = service.arm();
     Ok(PlayedReport::Wooden {
         reports: arm.reports(),
-        largest_force_n: arm.largest_force(),
+        largest_force_n: arm.held().largest_force(),
     })
 }

@@ -14,11 +14,8 @@ const TICK_S: f64 = 1e-3;
 /// The device of the published stability figures: 0.2 kg, no saturation.
 fn grip(damping: f64) -> Grip {
     Grip {
-        mass: 0.2,
         damping: Vector3::repeat(damping),
-        max_force: f64::INFINITY,
-        max_torque: f64::INFINITY,
-        ..Grip::workbench()
+        ..Grip::ball(0.2, 0.06, 2.0)
     }
 }
 

@@ -387,12 +387,12 @@ fn a_prop_stands_where_the_arm_is_and_forces_of_two_programs_add_up() {
         let service = &mut ends.service;
         let _ = service.answer(ms(2), 1, &push(0.5));
         let _ = service.answer(ms(2), 2, &push(0.25));
-        assert!((service.rendered().z - 0.75).abs() < 1e-12);
+        assert!((service.held().rendered().z - 0.75).abs() < 1e-12);
         // A message without a force ends the force of its session; silence ends the other.
         let _ = service.answer(ms(3), 1, r#"{"session":{}}"#);
-        assert!((service.rendered().z - 0.25).abs() < 1e-12);
+        assert!((service.held().rendered().z - 0.25).abs() < 1e-12);
         service.advance(ms(60));
-        assert_eq!(service.rendered().z, 0.0);
+        assert_eq!(service.held().rendered().z, 0.0);
     });
 }
 

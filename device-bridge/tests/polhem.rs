@@ -24,7 +24,7 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
     let mut held = OnFloor::new(device, &placement(), floor);
     held.until_felt("the floor");
     held.until("the floor at the arm", |_, _| {
-        terminal.device().rendered().z > 0.3
+        terminal.device().held().rendered().z > 0.3
     });
 
     drop(terminal);
@@ -33,7 +33,7 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
     held.until_felt("the cable is in");
     drop(held);
     wait_until("a force stayed", || {
-        terminal.device().rendered().norm() == 0.0
+        terminal.device().held().rendered().norm() == 0.0
     });
 }
 
@@ -43,7 +43,7 @@ fn no_line_to_the_board_jumps() {
     let link = folder.path().join("polhem");
     let path = MinJerkPath::hold(Pose::translation(0.01, 0.02, 0.03));
     let arm = SimulatedPolhem::new(VICE, Some(path), None);
-    let line = Faulty::of(arm, SimulatedPolhem::lines, |arm| arm.commanded());
+    let line = Faulty::of(arm, SimulatedPolhem::lines, |arm| arm.held().commanded());
     let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
     no_write_jumps(&format!("polhem:{}", link.display()), &line, &BAD_LINE);
 }

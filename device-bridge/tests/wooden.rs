@@ -35,7 +35,7 @@ fn a_floor_is_felt_through_the_reports_and_again_after_the_cable_was_out() {
         let mut held = OnFloor::new(device, &placement(), floor);
         held.until_felt("the floor");
         held.until("the floor at the arm", |_, _| {
-            service.arm().rendered().z > 0.3
+            service.arm().held().rendered().z > 0.3
         });
 
         drop(service);
@@ -43,7 +43,9 @@ fn a_floor_is_felt_through_the_reports_and_again_after_the_cable_was_out() {
         let service = plug();
         held.until_felt("the cable is in");
         drop(held);
-        wait_until("a force stayed", || service.arm().rendered().norm() == 0.0);
+        wait_until("a force stayed", || {
+            service.arm().held().rendered().norm() == 0.0
+        });
     }
 }
 

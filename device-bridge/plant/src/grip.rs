@@ -41,19 +41,26 @@ impl Grip {
     /// case for stability.
     #[must_use]
     pub fn workbench() -> Self {
-        const RADIUS: f64 = 0.06; // m
-        const DAMPING: f64 = 2.0; // N s/m
-        const MASS: f64 = 0.2; // kg
         Self {
-            mass: MASS,
-            damping: Vector3::repeat(DAMPING),
-            rotational_inertia: 0.4 * MASS * RADIUS * RADIUS, // a ball's
-            rotational_damping: Vector3::repeat(DAMPING * RADIUS * RADIUS),
+            max_force: 19.6,
+            max_torque: 1.16,
+            ..Self::ball(0.2, 0.06, 2.0)
+        }
+    }
+
+    /// A ball (kg, m) that is braked by `damping` (N s/m), at its radius where it turns; no more friction, and motors without limit.
+    #[must_use]
+    pub fn ball(mass: f64, radius: f64, damping: f64) -> Self {
+        Self {
+            mass,
+            damping: Vector3::repeat(damping),
+            rotational_inertia: 0.4 * mass * radius * radius,
+            rotational_damping: Vector3::repeat(damping * radius * radius),
             coulomb_force: Vector3::zeros(),
             coulomb_torque: Vector3::zeros(),
             string_inertia: Matrix6::zeros(),
-            max_force: 19.6,
-            max_torque: 1.16,
+            max_force: f64::INFINITY,
+            max_torque: f64::INFINITY,
         }
     }
 

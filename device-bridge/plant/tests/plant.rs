@@ -10,11 +10,7 @@ use taut_plant::{
 const TICK: Duration = Duration::from_millis(1);
 
 fn grip() -> Grip {
-    Grip {
-        max_force: f64::INFINITY,
-        max_torque: f64::INFINITY,
-        ..Grip::workbench()
-    }
+    Grip::ball(0.2, 0.06, 2.0)
 }
 
 fn released(grip: Grip) -> Plant {

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use taut_kinds::{Chosen, KindId, UnknownDevice, read_choice};
 use taut_plant::Grip;
-use taut_vrpn::Address;
+use taut_vrpn::{Address, SensorMapping};
 
 pub use settings::vrpn_settings;
 #[cfg(unix)]
@@ -122,6 +122,18 @@ pub struct ForceDevice {
     pub scale: Option<f64>,
     /// Whether it can turn a hand, not only push it.
     pub renders_torque: bool,
+}
+
+impl ForceDevice {
+    /// An arm that pushes and turns no hand, with a millisecond for its wire.
+    pub(crate) fn arm(grip: Grip, mapping: &SensorMapping) -> Self {
+        Self {
+            grip,
+            delay_s: 1e-3,
+            scale: Some(mapping.scale),
+            renders_torque: false,
+        }
+    }
 }
 
 impl InputChoice {

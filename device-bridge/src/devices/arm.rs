@@ -12,7 +12,7 @@
 use std::time::Duration;
 
 use nalgebra::{Isometry3, Vector3, Vector6};
-use taut_plant::stack;
+use taut_plant::{Grip, stack};
 use taut_vrpn::{PoseReport, SensorMapping};
 
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
@@ -25,6 +25,18 @@ const RATE_HZ: f64 = 1000.0;
 const MAX_AGE: Duration = Duration::from_millis(20);
 /// Time constant of the angular velocity, which is not measured, s.
 const TURN_LAG_S: f64 = 0.01;
+
+/// What an arm with this grip bears, in its own metres: no more than `largest_stiffness`, N/m, and no torque. Its force comes a period of the loop and as
+/// much on the wire after the reading.
+pub(crate) fn arm_limits(grip: &Grip, largest_stiffness: f64) -> DeviceLimits {
+    let (stable, _) = grip.critical_stiffness(1.0 / RATE_HZ, 2.0 / RATE_HZ);
+    DeviceLimits {
+        max_stiffness: stable.min(largest_stiffness),
+        max_rotational_stiffness: 0.0,
+        max_force: grip.max_force,
+        max_torque: 0.0,
+    }
+}
 
 /// What an arm said last: m, m/s, w x y z, its own axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -10,20 +10,14 @@ use taut_plant::Grip;
 use taut_vrpn::SensorMapping;
 
 use crate::choice::ForceDevice;
-use crate::device::DeviceLimits;
 use crate::devices::Anchor;
-use crate::devices::arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
+use crate::devices::arm::{ArmDevice, ArmPort, ArmSettings, ArmState, arm_limits};
 use crate::devices::wire_thread::ArmThread;
 use crate::haply::{
-    self, EVENTS_PORT, ExchangeSettings, HaplyError, ServiceAddress, workspace_centre,
+    self, EVENTS_PORT, ExchangeSettings, HaplyError, ServiceAddress, WORKSPACE_CENTRE,
 };
 use crate::own_thread::OwnThread;
 use crate::placement::Placement;
-
-/// The client's messages, and the loop around them, Hz.
-const RATE_HZ: f64 = 1000.0;
-/// From a reading to the force that answers it: a period in the loop, as much on the wire.
-const DELAY_S: f64 = 2.0 / RATE_HZ;
 
 /// The arm's mechanics as they are assumed: to be measured on a real one.
 #[must_use]
@@ -37,18 +31,6 @@ pub(crate) fn haply_grip() -> Grip {
         coulomb_torque: Vector3::zeros(),
         string_inertia: Matrix6::zeros(),
         max_force: 5.0, // N
-        max_torque: 0.0,
-    }
-}
-
-/// What an arm of this kind bears, N and N/m in the device's own metres.
-#[must_use]
-pub fn haply_limits() -> DeviceLimits {
-    let (max_stiffness, _) = haply_grip().critical_stiffness(1.0 / RATE_HZ, DELAY_S);
-    DeviceLimits {
-        max_stiffness,
-        max_rotational_stiffness: 0.0,
-        max_force: haply_grip().max_force,
         max_torque: 0.0,
     }
 }
@@ -80,9 +62,9 @@ impl HaplySettings {
     pub fn arm(&self) -> ArmSettings {
         ArmSettings {
             name: format!("Haply Inverse at {}", self.address),
-            limits: haply_limits(),
+            limits: arm_limits(&haply_grip(), f64::INFINITY),
             with_orientation: self.exchange.with_grip,
-            centre: workspace_centre().coords,
+            centre: WORKSPACE_CENTRE.into(),
             mapping: self.mapping,
             anchor: self.anchor,
         }
@@ -108,12 +90,7 @@ impl HaplySettings {
     /// What the arm is assumed to bear.
     #[must_use]
     pub fn force_device(&self) -> ForceDevice {
-        ForceDevice {
-            grip: haply_grip(),
-            delay_s: DELAY_S - 1.0 / RATE_HZ,
-            scale: Some(self.mapping.scale),
-            renders_torque: false,
-        }
+        ForceDevice::arm(haply_grip(), &self.mapping)
     }
 }
 

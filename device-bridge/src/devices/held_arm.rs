@@ -11,7 +11,7 @@ use crate::device::Pose;
 const LONGEST_SILENCE: Duration = Duration::from_secs(1);
 
 /// A plant that goes on with a clock.
-pub(crate) struct HeldArm {
+pub struct HeldArm {
     pub(crate) plant: Plant,
     begin: Plant,
     epoch: Option<Duration>,
@@ -46,22 +46,26 @@ impl HeldArm {
     }
 
     /// What the motors render, N.
-    pub(crate) fn rendered(&self) -> Vector3<f64> {
+    #[must_use]
+    pub fn rendered(&self) -> Vector3<f64> {
         self.plant.rendered_wrench().fixed_rows::<3>(0).into()
     }
 
     /// The last command, N.
-    pub(crate) fn commanded(&self) -> Vector3<f64> {
+    #[must_use]
+    pub fn commanded(&self) -> Vector3<f64> {
         self.commanded.0
     }
 
     /// Largest norm of a rendered force so far, N.
-    pub(crate) fn largest_force(&self) -> f64 {
+    #[must_use]
+    pub fn largest_force(&self) -> f64 {
         self.largest_force
     }
 
     /// Largest change from one command to the next so far, N; one to zero is none.
-    pub(crate) fn largest_jump(&self) -> f64 {
+    #[must_use]
+    pub fn largest_jump(&self) -> f64 {
         self.largest_jump
     }
 

@@ -153,17 +153,9 @@ impl StringHardware for HeldStrings {
 /// and no limit of its own, since the strings have theirs.
 #[must_use]
 pub fn string_grip(geometry: &Geometry, placement: &SpidarPlacement) -> Grip {
-    let arm = geometry.arm();
     Grip {
-        mass: geometry.grip_mass,
-        damping: Vector3::repeat(geometry.grip_damping),
-        rotational_inertia: 0.4 * geometry.grip_mass * arm * arm,
-        rotational_damping: Vector3::repeat(geometry.grip_damping * arm * arm),
-        coulomb_force: Vector3::zeros(),
-        coulomb_torque: Vector3::zeros(),
         string_inertia: motor_inertia(geometry, placement),
-        max_force: f64::INFINITY,
-        max_torque: f64::INFINITY,
+        ..Grip::ball(geometry.grip_mass, geometry.arm(), geometry.grip_damping)
     }
 }
 

@@ -23,8 +23,8 @@ pub(crate) mod wooden;
 
 pub use arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
 pub use glide::Glide;
+pub use haply::HaplySettings;
 pub(crate) use haply::haply_grip;
-pub use haply::{HaplySettings, haply_limits};
 pub use held_strings::{HeldStrings, string_grip};
 pub use led::{LedDevice, Target};
 pub use plugin::PluginSettings;

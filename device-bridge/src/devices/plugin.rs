@@ -33,10 +33,8 @@ impl PluginSettings {
     #[must_use]
     pub fn force_device(&self) -> ForceDevice {
         ForceDevice {
-            grip: haply_grip(),
-            delay_s: 1e-3,
-            scale: Some(self.mapping.scale),
             renders_torque: true,
+            ..ForceDevice::arm(haply_grip(), &self.mapping)
         }
     }
 

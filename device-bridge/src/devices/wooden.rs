@@ -10,15 +10,9 @@ use taut_plant::Grip;
 use taut_vrpn::SensorMapping;
 
 use crate::choice::ForceDevice;
-use crate::device::DeviceLimits;
-use crate::devices::arm::ArmSettings;
+use crate::devices::arm::{ArmSettings, arm_limits};
 use crate::devices::{Anchor, PolhemSettings, polhem_grip};
 use crate::wooden::{WOODEN_MODELS, WoodenModel};
-
-/// Of the loop around it, Hz.
-const RATE_HZ: f64 = 1000.0;
-/// From a reading to the force that answers it: a period in the loop, as much on the wire.
-const DELAY_S: f64 = 2.0 / RATE_HZ;
 
 /// An arm on a HID board.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,26 +52,15 @@ impl WoodenSettings {
     /// What the arm is assumed to bear.
     #[must_use]
     pub fn force_device(&self) -> ForceDevice {
-        ForceDevice {
-            grip: self.grip(),
-            delay_s: DELAY_S - 1.0 / RATE_HZ,
-            scale: Some(self.mapping.scale),
-            renders_torque: false,
-        }
+        ForceDevice::arm(self.grip(), &self.mapping)
     }
 
     /// The arm as a device.
     #[must_use]
     pub fn arm(&self) -> ArmSettings {
-        let (stable, _) = self.grip().critical_stiffness(1.0 / RATE_HZ, DELAY_S);
         ArmSettings {
             name: format!("{} on a HID board", self.model.name),
-            limits: DeviceLimits {
-                max_stiffness: stable.min(self.model.max_stiffness),
-                max_rotational_stiffness: 0.0,
-                max_force: self.model.max_force,
-                max_torque: 0.0,
-            },
+            limits: arm_limits(&self.grip(), self.model.max_stiffness),
             with_orientation: self.model.wrist_counts > 0.0,
             centre: Vector3::zeros(),
             mapping: self.mapping,

@@ -33,6 +33,6 @@ pub(crate) use events::listen;
 pub use exchange::{Exchange, ExchangeSettings, Unusable};
 pub use message::{Arm, GripKind, GripSaid, MessageError, Said};
 pub use service::{HaplyService, ServiceTotals};
-pub(crate) use simulated::workspace_centre;
+pub(crate) use simulated::WORKSPACE_CENTRE;
 pub use simulated::{SimulatedInverse, SimulatedSettings};
 pub use taut_kinds::ServiceAddress;

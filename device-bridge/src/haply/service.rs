@@ -120,9 +120,9 @@ impl HaplyService {
         ServiceTotals {
             messages: inverse.messages(),
             sessions: self.shared.sessions.load(Ordering::Relaxed),
-            largest_force: inverse.largest_force(),
-            force: inverse.rendered().norm(),
-            largest_jump: inverse.largest_jump(),
+            largest_force: inverse.held().largest_force(),
+            force: inverse.held().rendered().norm(),
+            largest_jump: inverse.held().largest_jump(),
         }
     }
 }

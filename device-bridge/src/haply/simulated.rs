@@ -6,11 +6,12 @@
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use serde_json::{Value, json};
-use taut_plant::{Grip, Hand, MinJerkPath, Tremor};
+use taut_plant::{Hand, MinJerkPath, Tremor};
 
 use crate::device::Pose;
+use crate::devices::haply_grip;
 use crate::devices::held_arm::{HeldArm, down_and_up};
 
 /// Middle of the arm's workspace in its own axes, m. Assumed.
@@ -27,8 +28,6 @@ const MAX_MESSAGE: usize = 1 << 20;
 /// What is simulated.
 #[derive(Clone, Debug)]
 pub struct SimulatedSettings {
-    /// Of the arm.
-    pub grip: Grip,
     /// Who holds it.
     pub hand: Hand,
     /// Where the hand leads it; poses of the cursor in the arm's axes. `None`: down by 60 mm and up again, for ever.
@@ -44,7 +43,6 @@ impl SimulatedSettings {
     #[must_use]
     pub fn held(hand: Hand) -> Self {
         Self {
-            grip: crate::devices::haply_grip(),
             hand,
             path: None,
             tremor: None,
@@ -82,7 +80,7 @@ impl SimulatedInverse {
         let path = path.unwrap_or_else(|| down_and_up(WORKSPACE_CENTRE.into()));
         let tremor = settings.tremor.clone();
         Self {
-            arm: HeldArm::new(settings.grip, settings.hand, path, tremor),
+            arm: HeldArm::new(haply_grip(), settings.hand, path, tremor),
             with_grip: settings.with_grip,
             plugged: true,
             pushes: HashMap::new(),
@@ -98,28 +96,16 @@ impl SimulatedInverse {
         self.plugged = plugged;
     }
 
-    /// What the motors render, N.
+    /// The arm in the hand.
     #[must_use]
-    pub fn rendered(&self) -> Vector3<f64> {
-        self.arm.rendered()
+    pub fn held(&self) -> &HeldArm {
+        &self.arm
     }
 
     /// Where the cursor truly is, the arm's axes.
     #[must_use]
     pub fn true_pose(&self) -> Pose {
         *self.arm.plant.pose()
-    }
-
-    /// Largest norm of a rendered force so far, N.
-    #[must_use]
-    pub fn largest_force(&self) -> f64 {
-        self.arm.largest_force()
-    }
-
-    /// Largest change of the force from one message to the next so far, N; one to zero is none.
-    #[must_use]
-    pub fn largest_jump(&self) -> f64 {
-        self.arm.largest_jump()
     }
 
     /// Messages answered so far.
@@ -246,7 +232,7 @@ impl SimulatedInverse {
         json!({
             "cursor_position": xyz(&pose.translation.vector),
             "cursor_velocity": xyz(&velocity),
-            "current_cursor_force": xyz(&self.rendered()),
+            "current_cursor_force": xyz(&self.arm.rendered()),
             // The arm's joints are not simulated.
             "angular_position": { "a0": 0.0, "a1": 0.0, "a2": 0.0 },
             "angular_velocity": { "a0": 0.0, "a1": 0.0, "a2": 0.0 },
@@ -301,9 +287,4 @@ fn arm_config() -> Value {
         "mount": {},
         "filters": { "force_gate": { "gain": 0.0 }, "damping": { "scalar": 0.0 } },
     })
-}
-
-/// The workspace's middle as a point.
-pub(crate) fn workspace_centre() -> Point3<f64> {
-    Point3::from(WORKSPACE_CENTRE)
 }

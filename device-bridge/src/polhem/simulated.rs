@@ -31,22 +31,10 @@ impl SimulatedPolhem {
         }
     }
 
-    /// What the motors render, N.
+    /// The arm in the hand.
     #[must_use]
-    pub fn rendered(&self) -> Vector3<f64> {
-        self.arm.rendered()
-    }
-
-    /// The force of the last line, N, unless the motors are off since.
-    #[must_use]
-    pub fn commanded(&self) -> Vector3<f64> {
-        self.arm.commanded()
-    }
-
-    /// Largest norm of a rendered force so far, N.
-    #[must_use]
-    pub fn largest_force(&self) -> f64 {
-        self.arm.largest_force()
+    pub fn held(&self) -> &HeldArm {
+        &self.arm
     }
 
     /// Lines taken so far.

@@ -77,16 +77,10 @@ impl SimulatedWooden {
         self.waits = false;
     }
 
-    /// What the motors render, N.
+    /// The arm in the hand.
     #[must_use]
-    pub fn rendered(&self) -> Vector3<f64> {
-        self.arm.rendered()
-    }
-
-    /// Largest norm of a rendered force so far, N.
-    #[must_use]
-    pub fn largest_force(&self) -> f64 {
-        self.arm.largest_force()
+    pub fn held(&self) -> &HeldArm {
+        &self.arm
     }
 
     /// Reports taken so far.

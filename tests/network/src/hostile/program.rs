@@ -152,7 +152,7 @@ impl Pressing {
 
     /// What the motors render, N.
     fn force(&self) -> f64 {
-        self.arm.arm().rendered().norm()
+        self.arm.arm().held().rendered().norm()
     }
 
     /// Ends the bridge; what the motors render after its last report, N. The board turns them off only where a report comes after a pause.
