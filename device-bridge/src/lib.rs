@@ -65,20 +65,18 @@ pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Fe
 #[cfg(unix)]
 pub use devices::WoodenSettings;
 pub use devices::{
-    Anchor, CapMode, CapSettings, CapState, Glide, HidPort, LedDevice, MODELS, Model, RateControl,
-    Report, ReportPort, ReportSource, ShortReport, SourceError, SpaceMouse, Target, TrackerReader,
-    VrpnDevice, VrpnSettings,
+    Anchor, CapMode, CapSettings, CapState, HidPort, LedDevice, ReportPort, ReportSource,
+    SourceError, SpaceMouse, Target, TrackerReader, VrpnDevice, VrpnSettings,
 };
 pub use devices::{
-    ArmDevice, ArmPort, ArmSettings, ArmState, AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand,
-    HandPreset, HaplySettings, HeldStrings, MAX_EDGE_DELAY, MinJerkPath, Motors, PathError,
-    PluginSettings, PolhemSettings, Progress, RecordedDevice, RemoteDevice, SimulatedDevice,
-    SpidarDevice, SpidarPlacement, SpidarUartError, SpidarUartSettings, Trace, TraceError, Tremor,
-    TremorMotion, UnknownHand, ViaPoint, min_jerk, string_grip,
+    ArmDevice, ArmPort, ArmSettings, ArmState, AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset,
+    HaplySettings, HeldStrings, MAX_EDGE_DELAY, MinJerkPath, PathError, PluginSettings,
+    PolhemSettings, RecordedDevice, RemoteDevice, SimulatedDevice, SpidarDevice, SpidarPlacement,
+    SpidarUartError, SpidarUartSettings, Trace, TraceError, Tremor, ViaPoint, string_grip,
 };
 pub use external::{
-    ExternalWrench, ExternalWrenchSettings, ExternalWrenchStatistics, JudgedWrench, MAX_AHEAD,
-    NewestWrench, Refused, SentWrench, WrenchAxes, WrenchReader,
+    ExternalWrench, ExternalWrenchSettings, ExternalWrenchStatistics, JudgedWrench, NewestWrench,
+    Refused, SentWrench, WrenchAxes, WrenchReader,
 };
 pub use own_thread::OwnThread;
 pub use placement::Placement;
@@ -86,16 +84,15 @@ pub use plugged::{PluggedPort, plugged_ports};
 pub use plugin::{VENDOR_LIBRARIES, VendorLibrary, VendorLibraryState};
 pub use port::{
     ArmingState, Command, CommandSource, ContactBound, DevicePort, EnergyObserver, EventKind,
-    Events, MAX_EVENTS_PER_TICK, Motion, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent,
-    SafetySettings, SlewLimit, Slewed, TickReport, UNIT_TOLERANCE, ValidationSettings, fade_share,
-    kind_of_fault, within_limits,
+    Events, Motion, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent, SafetySettings,
+    SlewLimit, Slewed, TickReport, ValidationSettings, within_limits,
 };
 pub use report::{BridgeReport, Quantiles};
 pub use simulate::{SimulateArgs, execute_simulation};
 pub use simulated_strings::{SimulatedSpidar, StringsError, simulated_spidar, string_geometry};
 pub use taut_recording::TraceSample;
 pub use trace_file::{TraceFileError, read_trace, via_points};
-pub use vrpn::{TrackerFeed, TrackerState, UnknownVrpnMode, VrpnMode, VrpnSource};
+pub use vrpn::{TrackerFeed, TrackerState, VrpnMode, VrpnSource};
 
 /// A time of a test.
 #[cfg(test)]

@@ -22,7 +22,6 @@ pub(crate) mod wire_thread;
 pub(crate) mod wooden;
 
 pub use arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
-pub use glide::Glide;
 pub use haply::HaplySettings;
 pub(crate) use haply::haply_grip;
 pub use held_strings::{HeldStrings, string_grip};
@@ -30,20 +29,14 @@ pub use led::{LedDevice, Target};
 pub use plugin::PluginSettings;
 pub use polhem::PolhemSettings;
 pub(crate) use polhem::polhem_grip;
-pub use rate_control::{CapMode, CapSettings, RateControl};
+pub use rate_control::{CapMode, CapSettings};
 pub use recorded::{AtEnd, RecordedDevice, Trace, TraceError};
 pub use remote::{DEFAULT_MAX_AGE, MAX_EDGE_DELAY, RemoteDevice};
 pub use simulated::SimulatedDevice;
-pub use space_mouse::{
-    CapState, HidPort, MODELS, Model, Report, ReportPort, ReportSource, ShortReport, SourceError,
-    SpaceMouse,
-};
+pub use space_mouse::{CapState, HidPort, ReportPort, ReportSource, SourceError, SpaceMouse};
 pub use spidar::{SpidarDevice, SpidarPlacement};
 pub use spidar_uart::{SpidarUartError, SpidarUartSettings};
-pub use taut_plant::{
-    Encoder, Grip, Hand, HandPreset, MinJerkPath, Motors, PathError, Progress, Tremor,
-    TremorMotion, UnknownHand, ViaPoint, min_jerk,
-};
+pub use taut_plant::{Grip, Hand, HandPreset, MinJerkPath, PathError, Tremor, ViaPoint};
 pub use vrpn::{Anchor, TrackerReader, VrpnDevice, VrpnSettings};
 #[cfg(unix)]
 pub use wooden::WoodenSettings;

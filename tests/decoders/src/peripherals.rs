@@ -4,8 +4,8 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use std::time::Duration;
 
 use god_object::Vector6;
+use taut_bridge::CapState;
 use taut_bridge::plugin::{ReadAnswer, read_answer};
-use taut_bridge::{CapState, Report};
 use taut_ros::{Attachment, Header as RosHeader, Message, ReceivedWrench, WrenchStamped};
 use taut_vrpn::{
     Client, Event, Header, MAX_LISTED_SENDERS, MAX_PENDING_BYTES, PoseReport, SensorMapping,
@@ -69,9 +69,7 @@ pub(crate) fn space_mouse(bytes: &[u8]) {
     while let Some((length, after)) = rest.split_first() {
         let (report, after) = after.split_at(usize::from(length % 17).min(after.len()));
         rest = after;
-        if let Ok(report) = Report::parse(report) {
-            cap.take(&report);
-        }
+        let _ = cap.take(report);
         let deflection = cap.deflection();
         assert!(
             deflection.iter().all(|x| (-1.0..=1.0).contains(x)),

@@ -12,9 +12,9 @@ use std::time::Duration;
 
 use nalgebra::Vector6;
 
-pub use report::{CapState, Report, ShortReport};
+pub use report::CapState;
 use source::MAX_REPORT_BYTES;
-pub use source::{HidPort, MODELS, Model, ReportPort, ReportSource, SourceError};
+pub use source::{HidPort, ReportPort, ReportSource, SourceError};
 
 use super::rate_control::{CapSettings, RateControl};
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample};
@@ -156,9 +156,9 @@ fn read_reports(
             Ok(0) => {}
             Ok(bytes) => {
                 // A report that is too short says nothing; the next one does.
-                if let Ok(report) = Report::parse(&buffer[..bytes.min(MAX_REPORT_BYTES)]) {
-                    newest.cap.take(&report);
-                    newest.motions += u64::from(report.is_motion());
+                let report = &buffer[..bytes.min(MAX_REPORT_BYTES)];
+                if let Some(is_motion) = newest.cap.take(report) {
+                    newest.motions += u64::from(is_motion);
                     output.write(newest);
                 }
             }

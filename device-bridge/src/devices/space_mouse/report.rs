@@ -18,75 +18,7 @@ use nalgebra::{Vector3, Vector6};
 use taut_plant::stack;
 
 /// Counts that count as full deflection.
-pub(crate) const FULL_DEFLECTION: f64 = 350.0;
-
-/// One report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Report {
-    /// The cap's displacement, counts, its own axes.
-    Translation([i16; 3]),
-    /// The cap's rotation.
-    Rotation([i16; 3]),
-    /// Both at once.
-    Motion {
-        /// As in [`Self::Translation`].
-        translation: [i16; 3],
-        /// As in [`Self::Rotation`].
-        rotation: [i16; 3],
-    },
-    /// All buttons, bit 0 the first.
-    Buttons(u64),
-    /// One that has nothing to say here.
-    Other(u8),
-}
-
-impl Report {
-    /// Reads one report, its number first.
-    ///
-    /// # Errors
-    /// [`ShortReport`].
-    pub fn parse(bytes: &[u8]) -> Result<Self, ShortReport> {
-        let short = ShortReport { bytes: bytes.len() };
-        let (number, rest) = bytes.split_first().ok_or(short)?;
-        match number {
-            1 => {
-                let translation = counts(rest).ok_or(short)?;
-                Ok(match counts(&rest[6..]) {
-                    Some(rotation) => Report::Motion {
-                        translation,
-                        rotation,
-                    },
-                    None => Report::Translation(translation),
-                })
-            }
-            2 => counts(rest).map(Report::Rotation).ok_or(short),
-            3 if rest.is_empty() => Err(short),
-            3 => {
-                let mut bits = [0; 8];
-                let known = rest.len().min(bits.len());
-                bits[..known].copy_from_slice(&rest[..known]);
-                Ok(Report::Buttons(u64::from_le_bytes(bits)))
-            }
-            other => Ok(Report::Other(*other)),
-        }
-    }
-
-    /// Whether it says how far the cap is deflected.
-    pub(super) fn is_motion(&self) -> bool {
-        matches!(
-            self,
-            Report::Translation(_) | Report::Rotation(_) | Report::Motion { .. }
-        )
-    }
-}
-
-/// A report that is shorter than its first byte says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a HID report of {bytes} bytes is too short; is this device a SpaceMouse?")]
-pub struct ShortReport {
-    /// Bytes that came, the first one included.
-    pub bytes: usize,
-}
+const FULL_DEFLECTION: f64 = 350.0;
 
 fn counts(bytes: &[u8]) -> Option<[i16; 3]> {
     let (x, rest) = bytes.split_first_chunk()?;
@@ -99,26 +31,32 @@ fn counts(bytes: &[u8]) -> Option<[i16; 3]> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CapState {
     /// Counts, the cap's own axes.
-    pub translation: [i16; 3],
-    /// Counts, the cap's own axes.
-    pub rotation: [i16; 3],
-    /// A bit per button.
-    pub buttons: u64,
+    translation: [i16; 3],
+    rotation: [i16; 3],
+    /// A bit per button, bit 0 the first.
+    pub(super) buttons: u64,
 }
 
 impl CapState {
-    /// Takes a report in.
-    pub fn take(&mut self, report: &Report) {
-        match *report {
-            Report::Translation(counts) => self.translation = counts,
-            Report::Rotation(counts) => self.rotation = counts,
-            Report::Motion {
-                translation,
-                rotation,
-            } => (self.translation, self.rotation) = (translation, rotation),
-            Report::Buttons(bits) => self.buttons = bits,
-            Report::Other(_) => {}
+    /// Takes a report in, its number first: whether it says how far the cap is deflected. One that is too short changes nothing, and is `None`.
+    pub fn take(&mut self, report: &[u8]) -> Option<bool> {
+        let (number, rest) = report.split_first()?;
+        match number {
+            1 => {
+                self.translation = counts(rest)?;
+                self.rotation = counts(&rest[6..]).unwrap_or(self.rotation);
+            }
+            2 => self.rotation = counts(rest)?,
+            3 if rest.is_empty() => return None,
+            3 => {
+                let mut bits = [0; 8];
+                let known = rest.len().min(bits.len());
+                bits[..known].copy_from_slice(&rest[..known]);
+                self.buttons = u64::from_le_bytes(bits);
+            }
+            _ => {}
         }
+        Some(matches!(number, 1 | 2))
     }
 
     /// Displacement over the largest, [-1, 1] per axis, linear then angular: x right, y away from the user, z up.
@@ -138,29 +76,43 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// Of a cap that has said something before.
+    const BEFORE: CapState = CapState {
+        translation: [7, 8, 9],
+        rotation: [10, 11, 12],
+        buttons: 0x10,
+    };
+
     /// A SpaceNavigator's own bytes, from public captures (tilt about its second axis; buttons), and reports of the same form by hand.
     #[test]
     fn reports_are_read_as_the_devices_send_them() {
-        for (bytes, report) in [
-            (&b"\x01\0\0\0\0\0\0"[..], Report::Translation([0; 3])),
-            (b"\x02\0\0\xe2\xff\0\0", Report::Rotation([0, -30, 0])),
-            (b"\x03\x01\0", Report::Buttons(1)),
-            (b"\x03\x03\0", Report::Buttons(3)),
-            (
-                b"\x01\x5e\x01\xa2\xfe\x0a\0",
-                Report::Translation([350, -350, 10]),
-            ),
-            (
-                b"\x01\x01\0\x02\0\x03\0\x04\0\xfb\xff\x06\0",
-                Report::Motion {
-                    translation: [1, 2, 3],
-                    rotation: [4, -5, 6],
-                },
-            ),
-            (b"\x03\0\0\0\x80", Report::Buttons(1 << 31)),
-            (b"\x17\x64", Report::Other(0x17)),
+        let moved = |translation| CapState {
+            translation,
+            ..BEFORE
+        };
+        let pressed = |buttons| CapState { buttons, ..BEFORE };
+        let turned = CapState {
+            rotation: [0, -30, 0],
+            ..BEFORE
+        };
+        let both = CapState {
+            translation: [1, 2, 3],
+            rotation: [4, -5, 6],
+            ..BEFORE
+        };
+        for (bytes, after, is_motion) in [
+            (&b"\x01\0\0\0\0\0\0"[..], moved([0; 3]), true),
+            (b"\x02\0\0\xe2\xff\0\0", turned, true),
+            (b"\x03\x01\0", pressed(1), false),
+            (b"\x03\x03\0", pressed(3), false),
+            (b"\x01\x5e\x01\xa2\xfe\x0a\0", moved([350, -350, 10]), true),
+            (b"\x01\x01\0\x02\0\x03\0\x04\0\xfb\xff\x06\0", both, true),
+            (b"\x03\0\0\0\x80", pressed(1 << 31), false),
+            (b"\x17\x64", BEFORE, false),
         ] {
-            assert_eq!(Report::parse(bytes), Ok(report), "{bytes:?}");
+            let mut cap = BEFORE;
+            assert_eq!(cap.take(bytes), Some(is_motion), "{bytes:?}");
+            assert_eq!(cap, after, "{bytes:?}");
         }
     }
 
@@ -173,19 +125,19 @@ mod tests {
             b"\x02\0\0\0\0\0",
             b"\x03",
         ] {
-            assert_eq!(
-                Report::parse(bytes),
-                Err(ShortReport { bytes: bytes.len() })
-            );
+            let mut cap = BEFORE;
+            assert_eq!((cap.take(bytes), cap), (None, BEFORE), "{bytes:?}");
         }
     }
 
     #[test]
     fn the_workbench_s_axes_are_right_away_and_up() {
-        let mut cap = CapState::default();
         // Pushed to the right, away from the user and pulled up; turned clockwise as seen from above.
-        cap.take(&Report::Translation([350, -175, -700]));
-        cap.take(&Report::Rotation([0, 0, 350]));
+        let cap = CapState {
+            translation: [350, -175, -700],
+            rotation: [0, 0, 350],
+            buttons: 0,
+        };
         assert_eq!(
             cap.deflection(),
             Vector6::new(1.0, 0.5, 1.0, -0.0, -0.0, -1.0)
@@ -196,9 +148,7 @@ mod tests {
         #[test]
         fn no_bytes_break_it_and_no_counts_leave_the_range(bytes in proptest::collection::vec(any::<u8>(), 0..64)) {
             let mut cap = CapState::default();
-            if let Ok(report) = Report::parse(&bytes) {
-                cap.take(&report);
-            }
+            let _ = cap.take(&bytes);
             prop_assert!(cap.deflection().amax() <= 1.0);
         }
 
@@ -207,10 +157,14 @@ mod tests {
             let bytes = |number: u8, counts: &[i16]| -> Vec<u8> {
                 std::iter::once(number).chain(counts.iter().flat_map(|c| c.to_le_bytes())).collect()
             };
-            let both = [translation, rotation].concat();
-            prop_assert_eq!(Report::parse(&bytes(1, &translation)), Ok(Report::Translation(translation)));
-            prop_assert_eq!(Report::parse(&bytes(2, &rotation)), Ok(Report::Rotation(rotation)));
-            prop_assert_eq!(Report::parse(&bytes(1, &both)), Ok(Report::Motion { translation, rotation }));
+            let wanted = CapState { translation, rotation, ..BEFORE };
+            let both = bytes(1, &[translation, rotation].concat());
+            let (first, then) = (bytes(1, &translation), bytes(2, &rotation));
+            for reports in [vec![both], vec![first, then]] {
+                let mut cap = BEFORE;
+                prop_assert!(reports.iter().all(|report| cap.take(report) == Some(true)));
+                prop_assert_eq!(cap, wanted);
+            }
         }
     }
 }

@@ -54,48 +54,31 @@ pub enum SourceError {
     NotBuiltIn,
 }
 
-/// A model with the numbers by which USB knows it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Model {
-    /// Of the vendor: Logitech for the older ones.
-    pub vendor: u16,
-    /// Of the product.
-    pub product: u16,
-    /// For people.
-    pub name: &'static str,
-}
-
-const fn model(vendor: u16, product: u16, name: &'static str) -> Model {
-    Model {
-        vendor,
-        product,
-        name,
-    }
-}
-
-/// The known models. Source: the device tables of the free spacenav project and of VRPN.
-pub const MODELS: [Model; 21] = [
-    model(0x046d, 0xc603, "SpaceMouse Plus XT"),
-    model(0x046d, 0xc605, "CadMan"),
-    model(0x046d, 0xc606, "SpaceMouse Classic"),
-    model(0x046d, 0xc621, "SpaceBall 5000"),
-    model(0x046d, 0xc623, "SpaceTraveler"),
-    model(0x046d, 0xc625, "SpacePilot"),
-    model(0x046d, 0xc626, "SpaceNavigator"),
-    model(0x046d, 0xc627, "SpaceExplorer"),
-    model(0x046d, 0xc628, "SpaceNavigator for Notebooks"),
-    model(0x046d, 0xc629, "SpacePilot Pro"),
-    model(0x046d, 0xc62b, "SpaceMouse Pro"),
-    model(0x256f, 0xc62e, "SpaceMouse Wireless"),
-    model(0x256f, 0xc62f, "SpaceMouse Wireless"),
-    model(0x256f, 0xc631, "SpaceMouse Pro Wireless"),
-    model(0x256f, 0xc632, "SpaceMouse Pro Wireless"),
-    model(0x256f, 0xc633, "SpaceMouse Enterprise"),
-    model(0x256f, 0xc635, "SpaceMouse Compact"),
-    model(0x256f, 0xc636, "SpaceMouse Module"),
-    model(0x256f, 0xc638, "SpaceMouse Pro Wireless"),
-    model(0x256f, 0xc63a, "SpaceMouse Wireless"),
-    model(0x256f, 0xc652, "3Dconnexion Universal Receiver"),
+/// The known models: the numbers by which USB knows vendor (Logitech for the older ones) and product, and the name. Source: the device tables of the free
+/// spacenav project and of VRPN.
+#[cfg(any(feature = "hid", test))]
+const MODELS: [(u16, u16, &str); 21] = [
+    (0x046d, 0xc603, "SpaceMouse Plus XT"),
+    (0x046d, 0xc605, "CadMan"),
+    (0x046d, 0xc606, "SpaceMouse Classic"),
+    (0x046d, 0xc621, "SpaceBall 5000"),
+    (0x046d, 0xc623, "SpaceTraveler"),
+    (0x046d, 0xc625, "SpacePilot"),
+    (0x046d, 0xc626, "SpaceNavigator"),
+    (0x046d, 0xc627, "SpaceExplorer"),
+    (0x046d, 0xc628, "SpaceNavigator for Notebooks"),
+    (0x046d, 0xc629, "SpacePilot Pro"),
+    (0x046d, 0xc62b, "SpaceMouse Pro"),
+    (0x256f, 0xc62e, "SpaceMouse Wireless"),
+    (0x256f, 0xc62f, "SpaceMouse Wireless"),
+    (0x256f, 0xc631, "SpaceMouse Pro Wireless"),
+    (0x256f, 0xc632, "SpaceMouse Pro Wireless"),
+    (0x256f, 0xc633, "SpaceMouse Enterprise"),
+    (0x256f, 0xc635, "SpaceMouse Compact"),
+    (0x256f, 0xc636, "SpaceMouse Module"),
+    (0x256f, 0xc638, "SpaceMouse Pro Wireless"),
+    (0x256f, 0xc63a, "SpaceMouse Wireless"),
+    (0x256f, 0xc652, "3Dconnexion Universal Receiver"),
 ];
 
 /// The first known model among the machine's HID devices.
@@ -108,23 +91,20 @@ impl ReportPort for HidPort {
         let gone = |error: hidapi::HidError| SourceError::Gone(error.to_string());
         let hid = hidapi::HidApi::new().map_err(gone)?;
         let found = hid.device_list().find_map(|device| {
-            let known = MODELS
-                .iter()
-                .find(|m| (m.vendor, m.product) == (device.vendor_id(), device.product_id()))?;
-            Some((device, known))
+            let same = |model: &&(u16, u16, _)| {
+                (model.0, model.1) == (device.vendor_id(), device.product_id())
+            };
+            Some((device, MODELS.iter().find(same)?))
         });
-        let (device, model) = found.ok_or(SourceError::NotFound)?;
+        let (device, &(vendor, _, name)) = found.ok_or(SourceError::NotFound)?;
         let device = device
             .open_device(&hid)
             .map_err(|error| SourceError::NotOpened {
-                name: model.name,
-                vendor: model.vendor,
+                name,
+                vendor,
                 cause: error.to_string(),
             })?;
-        Ok(Box::new(HidSource {
-            device,
-            name: model.name,
-        }))
+        Ok(Box::new(HidSource { device, name }))
     }
 }
 
@@ -161,14 +141,9 @@ mod tests {
 
     #[test]
     fn each_model_is_listed_once() {
-        for (place, one) in MODELS.iter().enumerate() {
-            let same = |other: &&Model| (other.vendor, other.product) == (one.vendor, one.product);
-            assert_eq!(
-                MODELS.iter().filter(same).count(),
-                1,
-                "{place}: {}",
-                one.name
-            );
+        for (vendor, product, name) in MODELS {
+            let same = |other: &&(u16, u16, _)| (other.0, other.1) == (vendor, product);
+            assert_eq!(MODELS.iter().filter(same).count(), 1, "{name}");
         }
     }
 
