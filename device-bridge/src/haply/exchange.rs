@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::devices::ArmState;
 
-use super::message::{GripKind, MessageError, PERMUTATION, Said, Say};
+use super::message::{MessageError, PERMUTATION, Said, Say};
 
 /// What is wanted of a service.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,7 +66,7 @@ pub enum Unusable {
 pub struct Exchange {
     settings: ExchangeSettings,
     arm: Option<String>,
-    grip: Option<(GripKind, String)>,
+    grip: Option<(&'static str, String)>,
     /// Messages said in this connection with the arm there.
     said: u32,
     other_basis: bool,
@@ -150,7 +150,7 @@ impl Exchange {
         self.arm = Some(arm.id.clone());
         if self.settings.with_grip {
             let grip = said.grips.iter().find(|grip| grip.orientation.is_some());
-            self.grip = grip.map(|grip| (grip.kind, grip.id.clone()));
+            self.grip = grip.map(|grip| (grip.array, grip.id.clone()));
         }
         let unknown = || "unknown".to_owned();
         tracing::info!(
@@ -200,9 +200,10 @@ impl Exchange {
             turning: None,
             buttons: 0,
         };
-        if let Some((kind, id)) = &self.grip {
-            let of = |grip: &&super::message::GripSaid| grip.kind == *kind && grip.id == *id;
-            let grip = said.grips.iter().find(of).filter(|grip| grip.ready);
+        if let Some((array, id)) = &self.grip {
+            let mut grips = said.grips.iter();
+            let grip = grips.find(|grip| grip.array == *array && grip.id == *id);
+            let grip = grip.filter(|grip| grip.ready);
             let grip = grip.ok_or(Unusable::NoGrip)?;
             state.orientation = Some(grip.orientation.ok_or(Unusable::NoGrip)?);
             state.buttons = grip.buttons;
@@ -223,7 +224,7 @@ impl Exchange {
             arm,
             set_basis: first,
             force: force.filter(|_| self.unusable.is_none()),
-            grip: self.grip.as_ref().map(|(kind, id)| (*kind, id.as_str())),
+            grip: self.grip.as_ref().map(|(array, id)| (*array, id.as_str())),
         };
         say.write(&mut self.text);
         // One that comes again is configured again: it may be a restarted one.

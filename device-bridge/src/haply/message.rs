@@ -81,22 +81,11 @@ pub struct Arm {
     pub powered: bool,
 }
 
-/// How a grip is connected: the name of its array.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GripKind {
-    /// `wireless_verse_grip`.
-    Wireless,
-    /// `custom_verse_grip`.
-    Custom,
-    /// `verse_grip`, by cable.
-    Wired,
-}
-
 /// A VerseGrip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GripSaid {
-    /// In which array it stands.
-    pub kind: GripKind,
+    /// Name of the array in which it stands: how it is connected.
+    pub array: &'static str,
     /// The service's name for it.
     pub id: String,
     /// Unit quaternion, w x y z.
@@ -211,9 +200,9 @@ impl Said {
     pub fn parse(text: &str) -> Result<Self, MessageError> {
         let message: Message = serde_json::from_str(text)?;
         let grips = [
-            (GripKind::Wireless, &message.wireless_verse_grip),
-            (GripKind::Custom, &message.custom_verse_grip),
-            (GripKind::Wired, &message.verse_grip),
+            ("wireless_verse_grip", &message.wireless_verse_grip),
+            ("custom_verse_grip", &message.custom_verse_grip),
+            ("verse_grip", &message.verse_grip), // by cable
         ];
         let count = message
             .inverse3
@@ -226,9 +215,9 @@ impl Said {
             session: message.session_id,
             ..Self::default()
         };
-        for (kind, of) in grips {
+        for (array, of) in grips {
             for grip in of {
-                said.grips.push(grip.checked(kind)?);
+                said.grips.push(grip.checked(array)?);
             }
         }
         for arm in message.inverse3 {
@@ -283,7 +272,7 @@ impl ArmMessage {
 }
 
 impl GripMessage {
-    fn checked(&self, kind: GripKind) -> Result<GripSaid, MessageError> {
+    fn checked(&self, array: &'static str) -> Result<GripSaid, MessageError> {
         let id = name(self.device_id.clone())?;
         let orientation = self
             .state
@@ -312,7 +301,7 @@ impl GripMessage {
             .as_ref()
             .is_none_or(|status| status.ready.unwrap_or(true) && status.connected.unwrap_or(true));
         Ok(GripSaid {
-            kind,
+            array,
             id,
             orientation,
             buttons,
@@ -343,8 +332,8 @@ pub(crate) struct Say<'a> {
     pub(crate) set_basis: bool,
     /// N; without one its state alone is asked for, and its motors go idle.
     pub(crate) force: Option<[f64; 3]>,
-    /// The grip that is read.
-    pub(crate) grip: Option<(GripKind, &'a str)>,
+    /// The grip that is read: its array and its name.
+    pub(crate) grip: Option<(&'static str, &'a str)>,
 }
 
 impl Say<'_> {
@@ -390,12 +379,7 @@ impl Say<'_> {
             }
             out.push_str("}]");
         }
-        if let Some((kind, id)) = self.grip {
-            let array = match kind {
-                GripKind::Wireless => "wireless_verse_grip",
-                GripKind::Custom => "custom_verse_grip",
-                GripKind::Wired => "verse_grip",
-            };
+        if let Some((array, id)) = self.grip {
             let _ = write!(
                 out,
                 ",\"{array}\":[{{\"device_id\":\"{id}\",\"commands\":{{\"probe_orientation\":{{}}}}}}]"
@@ -491,7 +475,7 @@ mod tests {
             arm: Some("04C3"),
             set_basis: true,
             force: None,
-            grip: Some((GripKind::Wireless, "0")),
+            grip: Some(("wireless_verse_grip", "0")),
         };
         say.write(&mut out);
         assert_eq!(

@@ -31,7 +31,7 @@ pub use client::{HaplyError, HaplyFound, look};
 pub use events::EVENTS_PORT;
 pub(crate) use events::listen;
 pub use exchange::{Exchange, ExchangeSettings, Unusable};
-pub use message::{Arm, GripKind, GripSaid, MessageError, Said};
+pub use message::{Arm, GripSaid, MessageError, Said};
 pub use service::{HaplyService, ServiceTotals};
 pub(crate) use simulated::WORKSPACE_CENTRE;
 pub use simulated::{SimulatedInverse, SimulatedSettings};
