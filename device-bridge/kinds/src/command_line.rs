@@ -11,22 +11,12 @@ const SUGGESTION_SIMILARITY: f64 = 0.7;
 /// A text that chooses no device.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownDevice {
-    /// No kind of that name.
-    #[error("there is no device `{name}`{hint}; use {}", names_and_forms())]
-    Name {
-        /// What was written.
-        name: String,
-        /// The nearest name, in a sentence's end, or nothing.
-        hint: String,
-    },
-    /// The kind needs more than its name.
-    #[error("the device `{name}` is incomplete; write {form}")]
-    Incomplete {
-        /// The kind.
-        name: &'static str,
-        /// What to write.
-        form: String,
-    },
+    /// No kind of that name; the nearest, in a sentence's end, or nothing.
+    #[error("there is no device `{0}`{1}; use {}", names_and_forms())]
+    Name(String, String),
+    /// The kind needs more than its name: what to write.
+    #[error("the device `{0}` is incomplete; write {1}")]
+    Incomplete(&'static str, String),
     /// No such option.
     #[error("the device `{device}` has no option `{option}`{hint}; it has {known}")]
     Option {
@@ -65,10 +55,8 @@ pub fn read_choice(text: &str) -> Result<Chosen, UnknownDevice> {
     let (name, rest) = text.split_at(end);
     let named = || KINDS.iter().filter(|kind| kind.on_command_line);
     let Some(kind) = named().find(|kind| kind.name == name) else {
-        return Err(UnknownDevice::Name {
-            name: text.to_owned(),
-            hint: nearest(name, named().map(|kind| kind.name)),
-        });
+        let hint = nearest(name, named().map(|kind| kind.name));
+        return Err(UnknownDevice::Name(text.to_owned(), hint));
     };
     let mut chosen = Chosen::plain(kind);
     let options = at(kind, rest, &mut chosen)?;
@@ -88,10 +76,7 @@ pub fn read_choice(text: &str) -> Result<Chosen, UnknownDevice> {
 
 /// What the kind is at: a file, a port, an address. Returns the options after it.
 fn at<'t>(kind: &Kind, rest: &'t str, chosen: &mut Chosen) -> Result<&'t str, UnknownDevice> {
-    let incomplete = || UnknownDevice::Incomplete {
-        name: kind.name,
-        form: kind.form(),
-    };
+    let incomplete = || UnknownDevice::Incomplete(kind.name, kind.form());
     let sign = if kind.needs_place { ':' } else { '=' };
     let (Some(key), Some(text)) = (&kind.place, rest.strip_prefix(sign)) else {
         return match rest.strip_prefix(',') {

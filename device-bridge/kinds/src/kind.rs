@@ -45,7 +45,7 @@ pub struct Kind {
     pub place: Option<Key>,
     /// How the place is called in a form.
     pub place_word: &'static str,
-    /// A place, for an error.
+    /// A place, for an error where it must be given.
     pub place_example: &'static str,
     /// Whether it must be given.
     pub needs_place: bool,

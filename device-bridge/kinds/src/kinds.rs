@@ -47,11 +47,6 @@ const OPTIONS: Key = in_file(
     Takes::Text("the options, with commas between"),
     "what is handed on as it is written; on the command line every other option is",
 );
-const PORT: Key = key(
-    "port",
-    Takes::File,
-    "its serial port, such as `/dev/ttyUSB0`",
-);
 const GEOMETRY: Takes = Takes::NameOrFile("g6x3r, g6x4r, g6x5r, wb or a geometry file");
 
 const PLAIN: Kind = Kind {
@@ -66,6 +61,18 @@ const PLAIN: Kind = Kind {
     hands_on: false,
     has_motors: false,
     on_command_line: true,
+};
+
+const ON_PORT: Kind = Kind {
+    place: Some(key(
+        "port",
+        Takes::File,
+        "its serial port, such as `/dev/ttyUSB0`",
+    )),
+    place_word: "PORT",
+    place_example: "/dev/ttyUSB0",
+    needs_place: true,
+    ..PLAIN
 };
 
 /// Every kind there is.
@@ -128,7 +135,6 @@ pub const KINDS: [Kind; 12] = [
             "the service; default `127.0.0.1:10001`",
         )),
         place_word: "HOST:PORT",
-        place_example: "127.0.0.1:10001",
         keys: &[
             key(
                 "arm",
@@ -156,10 +162,6 @@ pub const KINDS: [Kind; 12] = [
         id: KindId::Spidar,
         name: "spidar",
         what: "a SPIDAR-G on its UART motor boards: six degrees of freedom, force and torque",
-        place: Some(PORT),
-        place_word: "PORT",
-        place_example: "/dev/ttyUSB0",
-        needs_place: true,
         keys: &[
             key(
                 "geometry",
@@ -173,19 +175,15 @@ pub const KINDS: [Kind; 12] = [
             ),
         ],
         has_motors: true,
-        ..PLAIN
+        ..ON_PORT
     },
     Kind {
         id: KindId::Polhem,
         name: "polhem",
         what: "a Polhem arm on its text board: six degrees of freedom, force without torque",
-        place: Some(PORT),
-        place_word: "PORT",
-        place_example: "/dev/ttyUSB0",
-        needs_place: true,
         keys: &[AXES_OF_ARM, SCALE, ANCHOR],
         has_motors: true,
-        ..PLAIN
+        ..ON_PORT
     },
     Kind {
         id: KindId::Wooden,
@@ -197,7 +195,6 @@ pub const KINDS: [Kind; 12] = [
             "its HID port, such as `/dev/hidraw3`; default: the first that is found",
         )),
         place_word: "PORT",
-        place_example: "/dev/ttyUSB0",
         keys: &[
             key(
                 "model",

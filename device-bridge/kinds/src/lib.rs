@@ -8,7 +8,7 @@
 //! | `kind`            | what a declaration says                               |
 //! | `chosen`          | a kind with the values that somebody gave             |
 //! | `command_line`    | `haply=lab:10001,scale=2` into a [`Chosen`]           |
-//! | `page`            | the table of the document                             |
+//! | `page`            | the table of the document, for the test that compares them |
 //! | `service_address` | host and port                                         |
 #![forbid(unsafe_code)]
 
@@ -17,6 +17,7 @@ mod command_line;
 mod key;
 mod kind;
 mod kinds;
+#[cfg(test)]
 mod page;
 mod service_address;
 
@@ -25,5 +26,4 @@ pub use command_line::{UnknownDevice, device_help, read_choice};
 pub use key::{Key, Takes};
 pub use kind::{Kind, KindId};
 pub use kinds::KINDS;
-pub use page::keys_page;
 pub use service_address::{AddressError, ServiceAddress};

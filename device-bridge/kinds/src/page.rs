@@ -1,14 +1,14 @@
 //! The table of keys in `docs/devices.md`.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use crate::key::{Key, Takes};
 use crate::kind::Kind;
 use crate::kinds::KINDS;
 
 /// The table, as the document has it.
-#[must_use]
-pub fn keys_page() -> String {
+fn keys_page() -> String {
     let mut page = "| kind | key | value | meaning |\n| --- | --- | --- | --- |\n".to_owned();
     for kind in &KINDS {
         let mut name = format!("`{}`", kind.name);
@@ -58,57 +58,51 @@ fn value(takes: &Takes) -> String {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::path::Path;
-
-    /// A kind that is added without a word on what it was tried with, or on how a reader reports a real one, is caught here.
-    #[test]
-    fn the_document_says_of_every_kind_what_it_was_tried_with() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/devices.md");
-        let document = std::fs::read_to_string(path).expect("the document");
-        let (_, rest) = document.split_once("## What there is").expect("a heading");
-        let (there, rest) = rest.split_once("\n## ").expect("the next heading");
-        assert!(rest.contains("## How to tell us of a real device\n"));
-        for kind in &KINDS {
-            let name = kind.name;
-            let chosen = [
-                format!("`{name}`"),
-                format!("`{name}:"),
-                format!("`{name}="),
-                format!("kind = \"{name}\""),
-            ];
-            let row = there
-                .lines()
-                .filter(|line| line.starts_with('|'))
-                .find(|line| {
-                    let by = line.split('|').nth(2).unwrap_or("");
-                    chosen.iter().any(|text| by.contains(text))
-                });
-            let row = row.unwrap_or_else(|| panic!("no row for {name}"));
-            let tried = row.split('|').nth(5).unwrap_or("").trim();
-            assert!(tried.len() > 4, "tried with what? {row}");
-        }
+/// A kind that is added without a word on what it was tried with, or on how a reader reports a real one, is caught here.
+#[test]
+fn the_document_says_of_every_kind_what_it_was_tried_with() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/devices.md");
+    let document = std::fs::read_to_string(path).expect("the document");
+    let (_, rest) = document.split_once("## What there is").expect("a heading");
+    let (there, rest) = rest.split_once("\n## ").expect("the next heading");
+    assert!(rest.contains("## How to tell us of a real device\n"));
+    for kind in &KINDS {
+        let name = kind.name;
+        let chosen = [
+            format!("`{name}`"),
+            format!("`{name}:"),
+            format!("`{name}="),
+            format!("kind = \"{name}\""),
+        ];
+        let row = there
+            .lines()
+            .filter(|line| line.starts_with('|'))
+            .find(|line| {
+                let by = line.split('|').nth(2).unwrap_or("");
+                chosen.iter().any(|text| by.contains(text))
+            });
+        let row = row.unwrap_or_else(|| panic!("no row for {name}"));
+        let tried = row.split('|').nth(5).unwrap_or("").trim();
+        assert!(tried.len() > 4, "tried with what? {row}");
     }
+}
 
-    /// `TAUT_WRITE_DOCUMENTS=1` writes the table instead of comparing it.
-    #[test]
-    fn the_document_has_every_key() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/devices.md");
-        let document = std::fs::read_to_string(&path).expect("the document");
-        let (before, rest) = document.split_once("| kind | key |").expect("the table");
-        let end = rest.find("\n\n").map_or(rest.len(), |end| end + 1);
-        let wanted = keys_page();
-        if std::env::var_os("TAUT_WRITE_DOCUMENTS").is_some() {
-            let text = format!("{before}{wanted}{}", &rest[end..]);
-            std::fs::write(&path, text).expect("written");
-            return;
-        }
-        let found = format!("| kind | key |{}", &rest[..end]);
-        assert!(
-            found == wanted,
-            "docs/devices.md has another table of keys; run: TAUT_WRITE_DOCUMENTS=1 cargo test -p taut-kinds"
-        );
+/// `TAUT_WRITE_DOCUMENTS=1` writes the table instead of comparing it.
+#[test]
+fn the_document_has_every_key() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/devices.md");
+    let document = std::fs::read_to_string(&path).expect("the document");
+    let (before, rest) = document.split_once("| kind | key |").expect("the table");
+    let end = rest.find("\n\n").map_or(rest.len(), |end| end + 1);
+    let wanted = keys_page();
+    if std::env::var_os("TAUT_WRITE_DOCUMENTS").is_some() {
+        let text = format!("{before}{wanted}{}", &rest[end..]);
+        std::fs::write(&path, text).expect("written");
+        return;
     }
+    let found = format!("| kind | key |{}", &rest[..end]);
+    assert!(
+        found == wanted,
+        "docs/devices.md has another table of keys; run: TAUT_WRITE_DOCUMENTS=1 cargo test -p taut-kinds"
+    );
 }

@@ -209,10 +209,8 @@ impl DeviceChoice {
             KindId::Wooden => InputChoice::Wooden(Box::new(wooden_settings(chosen))),
             #[cfg(not(unix))]
             KindId::Wooden => {
-                return Err(UnknownDevice::Incomplete {
-                    name: chosen.kind.name,
-                    form: "it on Unix only".to_owned(),
-                });
+                let form = "it on Unix only".to_owned();
+                return Err(UnknownDevice::Incomplete(chosen.kind.name, form));
             }
             KindId::Plugin => {
                 InputChoice::Plugin(Box::new(plugin_settings(chosen, "library", Language::C)))
@@ -226,9 +224,8 @@ impl DeviceChoice {
             }
             KindId::SpaceMouse => InputChoice::SpaceMouse(cap_settings(chosen)),
             KindId::Vrpn => {
-                let settings = vrpn_settings(chosen).ok_or_else(|| UnknownDevice::Incomplete {
-                    name: chosen.kind.name,
-                    form: chosen.kind.form(),
+                let settings = vrpn_settings(chosen).ok_or_else(|| {
+                    UnknownDevice::Incomplete(chosen.kind.name, chosen.kind.form())
                 })?;
                 InputChoice::Vrpn(Box::new(settings))
             }
@@ -241,10 +238,8 @@ impl FromStr for DeviceChoice {
     type Err = UnknownDevice;
 
     fn from_str(text: &str) -> Result<Self, UnknownDevice> {
-        Self::of(&read_choice(text)?)?.ok_or_else(|| UnknownDevice::Name {
-            name: text.to_owned(),
-            hint: String::new(),
-        })
+        let choice = Self::of(&read_choice(text)?)?;
+        choice.ok_or_else(|| UnknownDevice::Name(text.to_owned(), String::new()))
     }
 }
 
