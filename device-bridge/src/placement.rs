@@ -93,15 +93,25 @@ impl Placement {
     /// World from a frame at G, parallel to the body's, of a body whose own frame is at `pose`.
     #[must_use]
     pub fn at_reference_point(&self, pose: &Pose) -> Pose {
-        Isometry3::from_parts((pose * self.reference_point).into(), pose.rotation)
+        at_point(pose, &self.reference_point)
     }
 
     /// The inverse of [`Self::at_reference_point`].
     #[must_use]
     pub fn from_reference_point(&self, pose: &Pose) -> Pose {
-        let lever = pose.rotation * self.reference_point.coords;
-        Isometry3::from_parts((pose.translation.vector - lever).into(), pose.rotation)
+        off_point(pose, &self.reference_point)
     }
+}
+
+/// The frame at a point of a body, parallel to the body's own, which is at `pose`.
+pub(crate) fn at_point(pose: &Pose, point: &Point3<f64>) -> Pose {
+    Isometry3::from_parts((pose * point).into(), pose.rotation)
+}
+
+/// The inverse of [`at_point`].
+pub(crate) fn off_point(pose: &Pose, point: &Point3<f64>) -> Pose {
+    let lever = pose.rotation * point.coords;
+    Isometry3::from_parts((pose.translation.vector - lever).into(), pose.rotation)
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
-use std::str::FromStr;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
@@ -49,22 +48,6 @@ pub enum VrpnMode {
 impl VrpnMode {
     /// All, with their names on the command line and in files.
     pub const NAMED: [(&'static str, Self); 2] = [("tcp", Self::Tcp), ("udp", Self::Udp)];
-}
-
-/// A text that names no [`VrpnMode`].
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no VRPN mode `{0}`; use tcp or udp")]
-pub struct UnknownVrpnMode(String);
-
-impl FromStr for VrpnMode {
-    type Err = UnknownVrpnMode;
-
-    fn from_str(text: &str) -> Result<Self, UnknownVrpnMode> {
-        let named = Self::NAMED.iter().find(|(name, _)| *name == text);
-        named
-            .map(|(_, mode)| *mode)
-            .ok_or_else(|| UnknownVrpnMode(text.to_owned()))
-    }
 }
 
 /// One sensor of a VRPN tracker.

@@ -24,17 +24,16 @@ const MAX_DOUBLINGS: u32 = 60;
 
 /// What a linear system does over a time with a held input: `z + change * z + response * u`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeldStep<const N: usize, const M: usize> {
+pub(crate) struct HeldStep<const N: usize, const M: usize> {
     /// `exp(A h) - 1`.
-    pub change: SMatrix<f64, N, N>,
+    pub(crate) change: SMatrix<f64, N, N>,
     /// Integral of `exp(A s) B`.
-    pub response: SMatrix<f64, N, M>,
+    pub(crate) response: SMatrix<f64, N, M>,
 }
 
 impl<const N: usize, const M: usize> HeldStep<N, M> {
     /// The step of `z' = A z + B u` over `duration` seconds, accurate to rounding. No allocation.
-    #[must_use]
-    pub fn new(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, M>, duration: f64) -> Self {
+    pub(crate) fn new(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, M>, duration: f64) -> Self {
         debug_assert!(duration >= 0.0);
         // Row sums bound every eigenvalue.
         let norm = (0..N)

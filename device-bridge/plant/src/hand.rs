@@ -160,10 +160,8 @@ impl FromStr for HandPreset {
 
     fn from_str(text: &str) -> Result<Self, UnknownHand> {
         let named = Self::NAMED.iter().find(|(name, _)| *name == text);
-        named.map_or_else(
-            || Err(UnknownHand(text.to_owned())),
-            |(_, preset)| Ok(*preset),
-        )
+        let preset = named.map(|(_, preset)| *preset);
+        preset.ok_or_else(|| UnknownHand(text.to_owned()))
     }
 }
 

@@ -47,17 +47,3 @@ impl Intention {
         self.path.at(time - self.begins)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_hand_goes_on_for_its_reaction_time() {
-        let at = |x: f64| Pose::translation(x, 0.0, 0.0);
-        let mut intention = Intention::new(MinJerkPath::hold(at(0.0)));
-        intention.decide(1.0, MinJerkPath::hold(at(1.0)));
-        assert_eq!(intention.at(1.17).0, at(0.0));
-        assert_eq!(intention.at(1.18).0, at(1.0));
-    }
-}

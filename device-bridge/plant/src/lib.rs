@@ -23,13 +23,12 @@ mod strings;
 mod tremor;
 
 pub use encoder::Encoder;
-pub use exponential::HeldStep;
 pub use grip::Grip;
 pub use hand::{Hand, HandPreset, UnknownHand};
 pub use intention::REACTION_TIME;
-pub use min_jerk::{MinJerkPath, PathError, Progress, ViaPoint, min_jerk};
-pub use motors::{MAX_PENDING, Motors};
+pub use min_jerk::{MinJerkPath, PathError, ViaPoint};
+pub use motors::Motors;
 pub use plant::Plant;
 pub use spatial::{Pose, displaced, is_finite, stack};
 pub use strings::{StringAnchors, string_inertia};
-pub use tremor::{Tremor, TremorMotion};
+pub use tremor::Tremor;

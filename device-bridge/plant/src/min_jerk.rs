@@ -14,26 +14,11 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector6};
 
 use crate::spatial::{Pose, is_finite, stack};
 
-/// Progress along a minimum-jerk movement and its derivatives in the fraction of its duration.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
-    /// s, in [0, 1].
-    pub value: f64,
-    /// ds/dtau.
-    pub rate: f64,
-    /// d2s/dtau2.
-    pub acceleration: f64,
-}
-
-/// The minimum-jerk profile at `fraction`; at rest outside [0, 1].
-#[must_use]
-pub fn min_jerk(fraction: f64) -> Progress {
+/// s at `fraction`, and ds/dtau; at rest outside [0, 1].
+fn min_jerk(fraction: f64) -> (f64, f64) {
     let t = fraction.clamp(0.0, 1.0);
-    Progress {
-        value: t * t * t * (10.0 + t * (-15.0 + 6.0 * t)),
-        rate: 30.0 * t * t * (1.0 - t) * (1.0 - t),
-        acceleration: 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t),
-    }
+    let progress = t * t * t * (10.0 + t * (-15.0 + 6.0 * t));
+    (progress, 30.0 * t * t * (1.0 - t) * (1.0 - t))
 }
 
 /// A pose to be passed, at rest, at a time.
@@ -51,18 +36,12 @@ pub enum PathError {
     /// No via point.
     #[error("the path has no via point; give at least one row")]
     Empty,
-    /// A time or a pose that is not finite.
-    #[error("via point {index} of the path is not finite; correct that row")]
-    NotFinite {
-        /// Which via point, from 0.
-        index: usize,
-    },
-    /// A time that is not after the one before it.
-    #[error("via point {index} of the path is not later than the one before it; sort the rows")]
-    TimeNotIncreasing {
-        /// Which via point, from 0.
-        index: usize,
-    },
+    /// A time or a pose that is not finite: which, from 0.
+    #[error("via point {0} of the path is not finite; correct that row")]
+    NotFinite(usize),
+    /// A time that is not after the one before it: which, from 0.
+    #[error("via point {0} of the path is not later than the one before it; sort the rows")]
+    TimeNotIncreasing(usize),
     /// A path that loops must end where it starts.
     #[error(
         "the looping path ends {distance_m} m and {angle_rad} rad from its start; repeat the first pose as the last row"
@@ -96,10 +75,10 @@ impl MinJerkPath {
         };
         for (index, point) in via_points.iter().enumerate() {
             if !(point.time_s.is_finite() && is_finite(&point.pose)) {
-                return Err(PathError::NotFinite { index });
+                return Err(PathError::NotFinite(index));
             }
             if index > 0 && point.time_s <= via_points[index - 1].time_s {
-                return Err(PathError::TimeNotIncreasing { index });
+                return Err(PathError::TimeNotIncreasing(index));
             }
         }
         if looping {
@@ -191,13 +170,13 @@ impl MinJerkPath {
 /// Pose and velocity at `time` on the movement `from` -> `to`.
 fn between(from: &ViaPoint, to: &ViaPoint, time: f64) -> (Pose, Vector6<f64>) {
     let duration = to.time_s - from.time_s;
-    let progress = min_jerk((time - from.time_s) / duration);
+    let (progress, rate) = min_jerk((time - from.time_s) / duration);
     let travel = to.pose.translation.vector - from.pose.translation.vector;
     let turn = (to.pose.rotation * from.pose.rotation.inverse()).scaled_axis();
 
-    let position = from.pose.translation.vector + travel * progress.value;
-    let rotation = UnitQuaternion::from_scaled_axis(turn * progress.value) * from.pose.rotation;
-    let rate = progress.rate / duration;
+    let position = from.pose.translation.vector + travel * progress;
+    let rotation = UnitQuaternion::from_scaled_axis(turn * progress) * from.pose.rotation;
+    let rate = rate / duration;
     let velocity = stack(&(travel * rate), &(turn * rate));
     (Isometry3::from_parts(position.into(), rotation), velocity)
 }
@@ -228,36 +207,20 @@ mod tests {
     #[test]
     fn the_profile_is_the_closed_form_and_rests_at_both_ends() {
         for end in [0.0, 1.0] {
-            let Progress {
-                value,
-                rate,
-                acceleration,
-            } = min_jerk(end);
-            assert_eq!((value, rate, acceleration), (end, 0.0, 0.0));
+            assert_eq!(min_jerk(end), (end, 0.0));
         }
-        // Half way: half the travel at 15/8 of the mean speed, no acceleration.
-        assert_eq!(
-            min_jerk(0.5),
-            Progress {
-                value: 0.5,
-                rate: 1.875,
-                acceleration: 0.0
-            }
-        );
-        let quarter = min_jerk(0.25);
-        assert!((quarter.value - 0.103_515_625).abs() < 1e-15);
+        // Half way: half the travel at 15/8 of the mean speed.
+        assert_eq!(min_jerk(0.5), (0.5, 1.875));
+        assert!((min_jerk(0.25).0 - 0.103_515_625).abs() < 1e-15);
     }
 
     #[test]
-    fn rate_and_acceleration_are_the_derivatives_of_the_profile() {
+    fn the_rate_is_the_derivative_of_the_profile() {
         let step = 1e-5;
         for fraction in [0.1, 0.3, 0.77] {
             let (before, after) = (min_jerk(fraction - step), min_jerk(fraction + step));
-            let here = min_jerk(fraction);
-            let rate = (after.value - before.value) / (2.0 * step);
-            let acceleration = (after.rate - before.rate) / (2.0 * step);
-            assert!((rate - here.rate).abs() < 1e-8);
-            assert!((acceleration - here.acceleration).abs() < 1e-8);
+            let rate = (after.0 - before.0) / (2.0 * step);
+            assert!((rate - min_jerk(fraction).1).abs() < 1e-8);
         }
     }
 
@@ -315,11 +278,11 @@ mod tests {
         };
         assert!(matches!(
             MinJerkPath::new(vec![at(0.0, 0.0), at(0.0, 1.0)], false),
-            Err(PathError::TimeNotIncreasing { index: 1 })
+            Err(PathError::TimeNotIncreasing(1))
         ));
         assert!(matches!(
             MinJerkPath::new(vec![at(0.0, 0.0), at(1.0, f64::NAN)], false),
-            Err(PathError::NotFinite { index: 1 })
+            Err(PathError::NotFinite(1))
         ));
     }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use nalgebra::Vector6;
 
 /// Most commands on their way at a time: 256 ms at 1 kHz. One more sends the oldest on at once.
-pub const MAX_PENDING: usize = 256;
+const MAX_PENDING: usize = 256;
 
 /// How motors follow commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -16,14 +16,14 @@ const COMPONENTS: usize = 3;
 const FREQUENCIES: [[f64; COMPONENTS]; 3] = [[8.3, 9.7, 11.3], [8.9, 10.1, 11.9], [8.1, 9.3, 10.7]];
 
 /// Displacement of the hand by tremor and its derivatives, world axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TremorMotion {
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct TremorMotion {
     /// m.
-    pub displacement: Vector3<f64>,
+    pub(crate) displacement: Vector3<f64>,
     /// m/s.
-    pub velocity: Vector3<f64>,
+    pub(crate) velocity: Vector3<f64>,
     /// m/s^2.
-    pub acceleration: Vector3<f64>,
+    pub(crate) acceleration: Vector3<f64>,
 }
 
 /// A seeded tremor. The same seed gives the same motion.
@@ -51,13 +51,8 @@ impl Tremor {
     }
 
     /// The motion at `time_s`.
-    #[must_use]
-    pub fn at(&self, time_s: f64) -> TremorMotion {
-        let mut motion = TremorMotion {
-            displacement: Vector3::zeros(),
-            velocity: Vector3::zeros(),
-            acceleration: Vector3::zeros(),
-        };
+    pub(crate) fn at(&self, time_s: f64) -> TremorMotion {
+        let mut motion = TremorMotion::default();
         for (axis, frequencies) in FREQUENCIES.iter().enumerate() {
             for (frequency, phase) in frequencies.iter().zip(self.phases[axis]) {
                 let omega = TAU * frequency;

@@ -27,7 +27,7 @@ const FIRST_INTERVAL_S: f64 = 1.0 / 60.0;
 
 /// A glide through poses. No allocation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Glide {
+pub(super) struct Glide {
     from: Pose,
     to: Pose,
     /// Rotation vector from `from` to `to`, world axes.
@@ -42,8 +42,7 @@ pub struct Glide {
 
 impl Glide {
     /// At rest at `pose`.
-    #[must_use]
-    pub fn at_rest(pose: Pose) -> Self {
+    pub(super) fn at_rest(pose: Pose) -> Self {
         Self {
             from: pose,
             to: pose,
@@ -56,7 +55,7 @@ impl Glide {
     }
 
     /// `pose` arrived at `now`; it is finite.
-    pub fn arrive(&mut self, now: Duration, pose: &Pose) {
+    pub(super) fn arrive(&mut self, now: Duration, pose: &Pose) {
         if let Some(last) = self.last_arrival.replace(now) {
             let passed = now.saturating_sub(last).as_secs_f64();
             let believed = passed.clamp(INTERVALS_S.0, INTERVALS_S.1);
@@ -70,8 +69,7 @@ impl Glide {
     }
 
     /// Pose at `now`, and velocity of its origin (m/s) then angular velocity (rad/s), world axes.
-    #[must_use]
-    pub fn at(&self, now: Duration) -> (Pose, Vector6<f64>) {
+    pub(super) fn at(&self, now: Duration) -> (Pose, Vector6<f64>) {
         let passed = now.saturating_sub(self.since).as_secs_f64();
         let is_under_way = passed < self.leg; // false for NaN: it rests
         if !is_under_way {

@@ -12,7 +12,7 @@
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 use taut_plant::{
     Grip, Hand, MinJerkPath, Plant, StringAnchors, Tremor, is_finite, stack, string_inertia,
 };
@@ -23,6 +23,7 @@ use taut_spidar::{
 
 use crate::device::Pose;
 use crate::devices::spidar::SpidarPlacement;
+use crate::placement::{at_point, off_point};
 
 /// Grid of the simulation: a tenth of a 1 kHz tick.
 const STEP: Duration = Duration::from_micros(100);
@@ -52,9 +53,7 @@ impl HeldStrings {
         hand: Hand,
         path: MinJerkPath,
     ) -> Self {
-        let reference_point = placement.reference_point;
-        let path =
-            path.map(|pose| Isometry3::from_parts((pose * reference_point).into(), pose.rotation));
+        let path = path.map(|pose| at_point(pose, &placement.reference_point));
         let grip = string_grip(geometry, &placement);
         Self {
             strings: SimulatedStrings::new(geometry, losses, Pose::identity()),
@@ -80,9 +79,7 @@ impl HeldStrings {
     /// Where the held body truly is, world from body.
     #[must_use]
     pub fn true_pose(&self) -> Pose {
-        let pose = self.plant.pose();
-        let lever = pose.rotation * self.placement.reference_point.coords;
-        Isometry3::from_parts((pose.translation.vector - lever).into(), pose.rotation)
+        off_point(self.plant.pose(), &self.placement.reference_point)
     }
 
     /// What truly moves the hand: N and N m at G, world axes.
@@ -162,8 +159,7 @@ pub fn string_grip(geometry: &Geometry, placement: &SpidarPlacement) -> Grip {
 /// What motors and drums add at G, with the grip at the centre of the frame.
 fn motor_inertia(geometry: &Geometry, placement: &SpidarPlacement) -> Matrix6<f64> {
     let body = placement.world_from_frame * placement.grip_from_body;
-    let g = body * placement.reference_point;
-    let at_g = Isometry3::from_parts(g.into(), body.rotation);
+    let at_g = at_point(&body, &placement.reference_point);
     let from_grip = at_g.inverse() * placement.world_from_frame;
     let anchors: [StringAnchors; STRINGS] = std::array::from_fn(|i| StringAnchors {
         motor: placement.world_from_frame * geometry.motors[i],

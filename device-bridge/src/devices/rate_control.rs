@@ -85,7 +85,7 @@ impl Default for CapSettings {
 
 /// The body under a cap. A step neither allocates nor waits.
 #[derive(Clone, Debug)]
-pub struct RateControl {
+pub(super) struct RateControl {
     settings: CapSettings,
     placement: Placement,
     /// World from a frame at G.
@@ -99,8 +99,7 @@ pub struct RateControl {
 
 impl RateControl {
     /// A body at rest at its start.
-    #[must_use]
-    pub fn new(settings: CapSettings, placement: Placement) -> Self {
+    pub(super) fn new(settings: CapSettings, placement: Placement) -> Self {
         let start = placement.at_reference_point(&placement.start);
         Self {
             settings,
@@ -114,14 +113,12 @@ impl RateControl {
     }
 
     /// Metres of the world that a metre on the workbench is.
-    #[must_use]
-    pub fn scale(&self) -> f64 {
+    pub(super) fn scale(&self) -> f64 {
         self.placement.scale()
     }
 
     /// Pose of the body's own frame, and velocity of G then angular velocity, world axes.
-    #[must_use]
-    pub fn state(&self) -> (Pose, Vector6<f64>) {
+    pub(super) fn state(&self) -> (Pose, Vector6<f64>) {
         (
             self.placement.from_reference_point(&self.pose),
             self.velocity,
@@ -130,7 +127,7 @@ impl RateControl {
 
     /// Goes on to `now` with the cap at `deflection` (workbench axes, linear then angular) and the coupling's `wrench`
     /// on the body. What is not finite counts as zero.
-    pub fn step(&mut self, now: Duration, deflection: &Vector6<f64>, wrench: &Vector6<f64>) {
+    pub(super) fn step(&mut self, now: Duration, deflection: &Vector6<f64>, wrench: &Vector6<f64>) {
         let last = self.last.replace(now).unwrap_or(now);
         let passed = now.saturating_sub(last).min(MAX_STEP).as_secs_f64();
         let CapSettings {

@@ -32,18 +32,12 @@ pub enum TraceError {
     /// No row.
     #[error("the trace has no row; give at least one")]
     Empty,
-    /// A time or a pose that is not finite.
-    #[error("row {row} of the trace is not finite; correct that row")]
-    NotFinite {
-        /// Which row, from 0.
-        row: usize,
-    },
-    /// A time that is not after the one before it.
-    #[error("row {row} of the trace is not later than the one before it; sort the rows")]
-    TimeNotIncreasing {
-        /// Which row, from 0.
-        row: usize,
-    },
+    /// A time or a pose that is not finite: which row, from 0.
+    #[error("row {0} of the trace is not finite; correct that row")]
+    NotFinite(usize),
+    /// A time that is not after the one before it: which row, from 0.
+    #[error("row {0} of the trace is not later than the one before it; sort the rows")]
+    TimeNotIncreasing(usize),
 }
 
 /// Replays a trace; its first row is the first call of [`Device::read`].
@@ -71,10 +65,10 @@ impl RecordedDevice {
         }
         for (row, entry) in trace.iter().enumerate() {
             if !(entry.time.is_finite() && is_finite(&entry.pose)) {
-                return Err(TraceError::NotFinite { row });
+                return Err(TraceError::NotFinite(row));
             }
             if row > 0 && entry.time <= trace[row - 1].time {
-                return Err(TraceError::TimeNotIncreasing { row });
+                return Err(TraceError::TimeNotIncreasing(row));
             }
         }
         Ok(Self {
@@ -219,13 +213,10 @@ mod tests {
         let build = |trace| RecordedDevice::new(trace, AtEnd::Hold, Point3::origin()).map(|_| ());
         assert_eq!(build(vec![]), Err(TraceError::Empty));
         let backwards = vec![row(0.0, 0.0, 0.0, 0), row(-1.0, 0.0, 0.0, 0)];
-        assert_eq!(
-            build(backwards),
-            Err(TraceError::TimeNotIncreasing { row: 1 })
-        );
+        assert_eq!(build(backwards), Err(TraceError::TimeNotIncreasing(1)));
         assert_eq!(
             build(vec![row(f64::NAN, 0.0, 0.0, 0)]),
-            Err(TraceError::NotFinite { row: 0 })
+            Err(TraceError::NotFinite(0))
         );
     }
 }

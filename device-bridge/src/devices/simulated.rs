@@ -6,10 +6,11 @@
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Point3, Vector6};
-use taut_plant::{Encoder, Grip, Hand, MinJerkPath, Motors, Plant, Tremor};
+use nalgebra::{Point3, Vector6};
+use taut_plant::{Grip, Hand, MinJerkPath, Plant, Tremor};
 
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
+use crate::placement::{at_point, off_point};
 
 /// Grid of the simulation: a tenth of a 1 kHz tick.
 const STEP: Duration = Duration::from_micros(100);
@@ -28,8 +29,6 @@ const LONGEST_SILENCE: Duration = Duration::from_secs(1);
 #[derive(Clone, Debug)]
 pub struct SimulatedDevice {
     info: DeviceInfo,
-    grip: Grip,
-    motors: Motors,
     plant: Plant,
     reference_point: Point3<f64>,
     /// Time of the first call.
@@ -43,16 +42,13 @@ impl SimulatedDevice {
     /// is G in that frame. The path's time 0 is the first call of [`Device::read`].
     #[must_use]
     pub fn new(grip: Grip, hand: Hand, path: MinJerkPath, reference_point: Point3<f64>) -> Self {
-        let path = path.map(|pose| at_reference_point(pose, &reference_point));
-        let motors = Motors::default();
+        let path = path.map(|pose| at_point(pose, &reference_point));
         Self {
             info: DeviceInfo {
-                limits: limits(&grip, &motors),
+                limits: limits(&grip),
                 rate_hz: RATE_HZ,
                 ..DeviceInfo::ideal("simulated", 6)
             },
-            grip,
-            motors,
             plant: Plant::new(grip, hand, path),
             reference_point,
             epoch: None,
@@ -68,28 +64,12 @@ impl SimulatedDevice {
         self
     }
 
-    /// Motors that are late.
-    #[must_use]
-    pub fn with_motors(mut self, motors: Motors) -> Self {
-        self.motors = motors;
-        self.info.limits = limits(&self.grip, &motors);
-        self.plant = self.plant.with_motors(motors);
-        self
-    }
-
-    /// An encoder that counts.
-    #[must_use]
-    pub fn with_encoder(mut self, encoder: Encoder) -> Self {
-        self.plant = self.plant.with_encoder(encoder);
-        self
-    }
-
     /// Replaces the hand, such as by [`Hand::RELEASED`]; pose and velocity go on.
     pub fn set_hand(&mut self, hand: Hand) {
         self.plant.set_hand(hand);
     }
 
-    /// The wrench that the motors render now: the last one written, delayed, lagging and saturated as the motors are.
+    /// The wrench that the motors render now: the last one written, saturated as the motors are.
     #[must_use]
     pub fn rendered_wrench(&self) -> &Vector6<f64> {
         self.plant.rendered_wrench()
@@ -116,7 +96,7 @@ impl Device for SimulatedDevice {
         self.advance(now);
         Ok(DeviceSample {
             time: self.epoch.unwrap_or(now) + self.elapsed,
-            pose: from_reference_point(&self.plant.measured_pose(), &self.reference_point),
+            pose: off_point(&self.plant.measured_pose(), &self.reference_point),
             velocity: *self.plant.velocity(),
             buttons: 0,
         })
@@ -129,24 +109,13 @@ impl Device for SimulatedDevice {
 }
 
 /// What the device renders faithfully with nobody to hold it: the largest stable stiffnesses of the loop and the motors' limits.
-fn limits(grip: &Grip, motors: &Motors) -> DeviceLimits {
-    let delay = LOOP_DELAY_S + motors.delay.as_secs_f64() + motors.lag.as_secs_f64();
-    let (max_stiffness, max_rotational_stiffness) = grip.critical_stiffness(1.0 / RATE_HZ, delay);
+fn limits(grip: &Grip) -> DeviceLimits {
+    let (max_stiffness, max_rotational_stiffness) =
+        grip.critical_stiffness(1.0 / RATE_HZ, LOOP_DELAY_S);
     DeviceLimits {
         max_stiffness,
         max_rotational_stiffness,
         max_force: grip.max_force,
         max_torque: grip.max_torque,
     }
-}
-
-/// World from a frame at G, parallel to the body's, of a body whose own frame is at `pose`.
-fn at_reference_point(pose: &Pose, reference_point: &Point3<f64>) -> Pose {
-    Isometry3::from_parts((pose * reference_point).into(), pose.rotation)
-}
-
-/// The inverse of [`at_reference_point`].
-fn from_reference_point(pose: &Pose, reference_point: &Point3<f64>) -> Pose {
-    let lever = pose.rotation * reference_point.coords;
-    Isometry3::from_parts((pose.translation.vector - lever).into(), pose.rotation)
 }

@@ -28,7 +28,7 @@ use crate::port::{fade_share, within_limits};
 pub use statistics::{ExternalWrenchStatistics, Refused};
 
 /// Most that the time of a value may be ahead of its arrival: clocks that agree differ by far less.
-pub const MAX_AHEAD: Duration = Duration::from_millis(20);
+const MAX_AHEAD: Duration = Duration::from_millis(20);
 
 /// The axes that values are given in.
 #[derive(Clone, Copy, Debug, PartialEq)]

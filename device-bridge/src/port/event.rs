@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::device::DeviceFault;
 
 /// Most events of one tick; more are counted and dropped.
-pub const MAX_EVENTS_PER_TICK: usize = 8;
+const MAX_EVENTS_PER_TICK: usize = 8;
 
 /// What happened at the port. The number that goes with it has the unit that [`EventKind::unit`] says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -234,8 +234,7 @@ impl fmt::Display for SafetyEvent {
 }
 
 /// What a fault of the device is as an event: its kind and its number.
-#[must_use]
-pub fn kind_of_fault(fault: &DeviceFault) -> (EventKind, f64) {
+pub(super) fn kind_of_fault(fault: &DeviceFault) -> (EventKind, f64) {
     match fault {
         DeviceFault::NotStarted => (EventKind::DeviceNotStarted, 0.0),
         DeviceFault::Lost { age } => (EventKind::DeviceLost, age.as_secs_f64()),

@@ -32,17 +32,18 @@ mod slew;
 mod validation;
 mod watchdog;
 
-pub use arming::{ArmingState, CommandSource, fade_share};
+pub(crate) use arming::fade_share;
+pub use arming::{ArmingState, CommandSource};
 pub use clamp::within_limits;
 pub use device_port::{DevicePort, Reading, TickReport};
 pub use energy::EnergyObserver;
 pub(crate) use event::EdgeDetector;
-pub use event::{EventKind, Events, MAX_EVENTS_PER_TICK, SafetyEvent, kind_of_fault};
+pub use event::{EventKind, Events, SafetyEvent};
 pub use motion::Motion;
 pub use passivity::{Passivity, PassivitySettings};
 pub use settings::{ContactBound, Rearm, SafetySettings};
 pub use slew::{SlewLimit, Slewed};
-pub use validation::{UNIT_TOLERANCE, ValidationSettings};
+pub use validation::ValidationSettings;
 pub use watchdog::Command;
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ const SPEED_WINDOW: Duration = Duration::from_millis(10);
 const LAST_CHANGE: f64 = 0.5;
 
 /// How far the norm of a quaternion may be from one: rounding of single precision.
-pub const UNIT_TOLERANCE: f64 = 1e-6;
+const UNIT_TOLERANCE: f64 = 1e-6;
 
 /// Limits of the checks.
 #[derive(Clone, Copy, Debug, PartialEq)]

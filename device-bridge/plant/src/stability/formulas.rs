@@ -40,12 +40,16 @@ pub fn passive_limit(damping: f64, virtual_damping: f64, period: f64) -> f64 {
 /// Source: Abbott & Okamura 2005.
 #[must_use]
 pub fn passive_limit_quantised(damping: f64, coulomb: f64, period: f64, resolution: f64) -> f64 {
-    let quantised = if resolution > 0.0 {
+    passive_limit(damping, 0.0, period).min(resolution_limit(coulomb, resolution))
+}
+
+/// `2 f_c / Delta` of it.
+pub(super) fn resolution_limit(coulomb: f64, resolution: f64) -> f64 {
+    if resolution > 0.0 {
         2.0 * coulomb / resolution
     } else {
         f64::INFINITY
-    };
-    passive_limit(damping, 0.0, period).min(quantised)
+    }
 }
 
 /// Damping that a device must exceed for the sampled wall `H(z) = K + B (z - 1) / (T z)`, a delay late, to be passive:

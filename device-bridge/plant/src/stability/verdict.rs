@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::formulas::resolution_limit;
 use super::{SampledLoop, passive_damping};
 
 /// Relative width in which the largest passive stiffness is told.
@@ -73,11 +74,7 @@ impl DeclaredAxis {
         };
 
         let by_damping = self.passive_by_damping();
-        let by_resolution = if self.resolution > 0.0 {
-            2.0 * self.coulomb / self.resolution
-        } else {
-            f64::INFINITY
-        };
+        let by_resolution = resolution_limit(self.coulomb, self.resolution);
         let passive_limit = if by_resolution < by_damping {
             PassiveLimit::Resolution
         } else if by_damping == 0.0 && axis.virtual_damping > 0.0 {
