@@ -75,14 +75,6 @@ impl PoseAnswer {
         let twist = self.normal.solve(&right);
         Vector6::from_fn(|k, _| if k < 3 { twist[k] } else { twist[k] / self.arm })
     }
-
-    /// Pose error (m, rad; frame axes) per error of length `string`, with the others right: for error budgets.
-    #[must_use]
-    pub fn sensitivity(&self, string: usize) -> Vector6<f64> {
-        let mut error = [0.0; STRINGS];
-        error[string] = 1.0;
-        self.twist(&error)
-    }
 }
 
 /// The solver, with the last good pose as its start. No allocation.

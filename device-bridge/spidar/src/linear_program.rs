@@ -174,7 +174,7 @@ fn farthest(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     const TOP: f64 = 1.0;
@@ -185,7 +185,7 @@ mod tests {
     }
 
     /// xorshift64*, in [-1, 1).
-    fn random(state: &mut u64) -> f64 {
+    pub(crate) fn random(state: &mut u64) -> f64 {
         *state ^= *state >> 12;
         *state ^= *state << 25;
         *state ^= *state >> 27;

@@ -220,17 +220,9 @@ pub(crate) fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linear_program::tests::random;
     use crate::{Geometry, Pose, StringMatrix};
     use nalgebra::Vector3;
-
-    /// xorshift64*, in [-1, 1).
-    fn random(state: &mut u64) -> f64 {
-        *state ^= *state >> 12;
-        *state ^= *state << 25;
-        *state ^= *state >> 27;
-        let bits = state.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11;
-        2.0 * bits as f64 / (1_u64 << 53) as f64 - 1.0
-    }
 
     #[test]
     fn the_linear_program_and_cutting_planes_find_one_scale() {

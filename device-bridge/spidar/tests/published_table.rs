@@ -86,7 +86,9 @@ fn quantisation_costs_micrometres_and_millidegrees() {
         let count = geometry.metres_per_count[0].abs();
         let (mut variance, mut worst) = (Vector6::zeros(), Vector6::zeros());
         for string in 0..8 {
-            let sensitivity = centre.sensitivity(string);
+            let mut error = [0.0; 8];
+            error[string] = 1.0;
+            let sensitivity = centre.twist(&error); // m, rad, per metre of its length
             variance += sensitivity.component_mul(&sensitivity) * (count * count / 12.0);
             worst += sensitivity.abs() * (0.5 * count);
         }
