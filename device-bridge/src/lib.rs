@@ -84,8 +84,8 @@ pub use plugged::{PluggedPort, plugged_ports};
 pub use plugin::{VENDOR_LIBRARIES, VendorLibrary, VendorLibraryState};
 pub use port::{
     ArmingState, Command, CommandSource, ContactBound, DevicePort, EnergyObserver, EventKind,
-    Events, Motion, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent, SafetySettings,
-    SlewLimit, Slewed, TickReport, ValidationSettings, within_limits,
+    Events, Limited, Motion, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent,
+    SafetySettings, SlewLimit, TickReport, ValidationSettings, within_limits,
 };
 pub use report::{BridgeReport, Quantiles};
 pub use simulate::{SimulateArgs, execute_simulation};

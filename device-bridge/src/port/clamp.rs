@@ -5,24 +5,25 @@
 //! ratio of the two, never a direction.
 
 use nalgebra::{Vector3, Vector6};
+use taut_plant::stack;
 
 /// A wrench inside its limits, and which of them acted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Clamped {
+pub struct Limited {
     /// N, N m.
-    pub(super) wrench: Vector6<f64>,
-    /// Norm of the force that was asked for, where it was too large, N.
+    pub wrench: Vector6<f64>,
+    /// The force, or the change of the force, that was asked for where it was too large, N.
     pub(super) force_asked: Option<f64>,
-    /// Norm of the torque that was asked for, where it was too large, N m.
+    /// The same of the torque, N m.
     pub(super) torque_asked: Option<f64>,
 }
 
 /// `wrench`, which is finite, with the norms of its parts limited. A limit that is negative or NaN lets nothing through.
-pub(super) fn clamp(wrench: &Vector6<f64>, max_force: f64, max_torque: f64) -> Clamped {
+pub(super) fn clamp(wrench: &Vector6<f64>, max_force: f64, max_torque: f64) -> Limited {
     let (force, force_asked) = clamp_part(wrench.fixed_rows::<3>(0).into(), max_force);
     let (torque, torque_asked) = clamp_part(wrench.fixed_rows::<3>(3).into(), max_torque);
-    Clamped {
-        wrench: join(&force, &torque),
+    Limited {
+        wrench: stack(&force, &torque),
         force_asked,
         torque_asked,
     }
@@ -32,11 +33,6 @@ pub(super) fn clamp(wrench: &Vector6<f64>, max_force: f64, max_torque: f64) -> C
 #[must_use]
 pub fn within_limits(wrench: &Vector6<f64>, max_force: f64, max_torque: f64) -> Vector6<f64> {
     clamp(wrench, max_force, max_torque).wrench
-}
-
-/// Force and torque as one wrench.
-pub(super) fn join(force: &Vector3<f64>, torque: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
 }
 
 fn clamp_part(part: Vector3<f64>, limit: f64) -> (Vector3<f64>, Option<f64>) {

@@ -6,14 +6,14 @@ use nalgebra::{Point3, Vector6};
 
 use super::arming::{Arming, ArmingState, CommandSource, Situation};
 use super::buttons::Buttons;
-use super::clamp::{Clamped, clamp};
+use super::clamp::{Limited, clamp};
 use super::energy::EnergyObserver;
 use super::event::{EdgeDetector, EventKind, Events, TickEvents, kind_of_fault};
 use super::gone::Gone;
 use super::motion::Motion;
 use super::passivity::PassivityController;
 use super::settings::SafetySettings;
-use super::slew::{SlewLimit, Slewed};
+use super::slew::SlewLimit;
 use super::validation::{SampleCheck, Verdict, at_rest};
 use super::watchdog::{Command, Freshness, Missing, freshness};
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Felt, Pose};
@@ -381,7 +381,7 @@ impl DevicePort {
     }
 
     /// Tells which limits begin to act.
-    fn tell_limits(&mut self, now: Duration, limited: &Clamped, slewed: &Slewed, debt: f64) {
+    fn tell_limits(&mut self, now: Duration, limited: &Limited, slewed: &Limited, debt: f64) {
         let felt = self.arming.gain() > 0.0;
         // A force that comes or goes away is slow on purpose; why it does is told by itself.
         let armed = self.arming.state() == ArmingState::Armed;

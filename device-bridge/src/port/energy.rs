@@ -13,8 +13,8 @@
 //! Source: Hannaford & Ryu 2002 (time-domain passivity observer), in its position form.
 
 use nalgebra::{Point3, UnitQuaternion, Vector6};
+use taut_plant::stack;
 
-use super::clamp::join;
 use crate::device::Pose;
 
 /// Sums the work of the wrench at the device port. No allocation.
@@ -61,7 +61,7 @@ impl EnergyObserver {
         if let Some((last_point, last_rotation)) = self.last {
             let travel = point - last_point;
             let turn = (pose.rotation * last_rotation.inverse()).scaled_axis();
-            self.travel = join(&travel, &turn);
+            self.travel = stack(&travel, &turn);
             let done = self.held.dot(&self.travel);
             if done.is_finite() {
                 work = done;

@@ -320,10 +320,10 @@ pub(crate) struct EdgeDetector {
 }
 
 impl EdgeDetector {
-    /// Shorter gaps are one edges: a limit that chatters is told once.
+    /// After a shorter gap it goes on: a limit that chatters is told once.
     const QUIET: Duration = Duration::from_millis(100);
 
-    /// Whether a edges begins with this tick.
+    /// Whether one begins with this tick.
     pub(crate) fn begins(&mut self, now: Duration, is_on: bool) -> bool {
         if !is_on {
             return false;

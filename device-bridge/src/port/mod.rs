@@ -34,7 +34,7 @@ mod watchdog;
 
 pub(crate) use arming::fade_share;
 pub use arming::{ArmingState, CommandSource};
-pub use clamp::within_limits;
+pub use clamp::{Limited, within_limits};
 pub use device_port::{DevicePort, Reading, TickReport};
 pub use energy::EnergyObserver;
 pub(crate) use event::EdgeDetector;
@@ -42,7 +42,7 @@ pub use event::{EventKind, Events, SafetyEvent};
 pub use motion::Motion;
 pub use passivity::{Passivity, PassivitySettings};
 pub use settings::{ContactBound, Rearm, SafetySettings};
-pub use slew::{SlewLimit, Slewed};
+pub use slew::SlewLimit;
 pub use validation::ValidationSettings;
 pub use watchdog::Command;
 

@@ -27,8 +27,8 @@
 //! energy that bounds the force.
 
 use nalgebra::{Vector3, Vector6};
+use taut_plant::stack;
 
-use super::clamp::join;
 use super::settings::ContactBound;
 
 /// Free motion after which no credit is left, s.
@@ -196,7 +196,7 @@ impl PassivityController {
             span,
         );
         Damping {
-            wrench: join(&force, &torque),
+            wrench: stack(&force, &torque),
             debt: self.debt,
         }
     }

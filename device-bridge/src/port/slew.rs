@@ -19,8 +19,9 @@
 use std::time::Duration;
 
 use nalgebra::{Vector3, Vector6};
+use taut_plant::stack;
 
-use super::clamp::join;
+use super::clamp::Limited;
 use super::settings::SafetySettings;
 
 /// By how much more than a linear spring a contact may change: turning normals, textures, damping, a hand that speeds up within the average of its
@@ -30,17 +31,6 @@ const MARGIN: f64 = 1.5;
 /// The device's motion explains at most so many times the change that nothing explains: 2 N/ms beside 0.5 N/ms. Derived from the fastest contact that
 /// the laboratory judges: 1000 N/m at 1 m/s and the margin, and a third more.
 const MOST: f64 = 4.0;
-
-/// A wrench that may follow the last one, and which limits acted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slewed {
-    /// N, N m.
-    pub wrench: Vector6<f64>,
-    /// Change of the force that was asked for, where it was too large for a whole period, N.
-    pub(super) force_asked: Option<f64>,
-    /// The same for the torque, N m.
-    pub(super) torque_asked: Option<f64>,
-}
 
 /// How fast one part of the wrench may change.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +95,7 @@ impl SlewLimit {
     }
 
     /// Moves what is rendered towards `target`, which is finite, as far as the time since the last call and the device's `speed` allow.
-    pub fn step(&mut self, now: Duration, target: &Vector6<f64>, speed: f64) -> Slewed {
+    pub fn step(&mut self, now: Duration, target: &Vector6<f64>, speed: f64) -> Limited {
         // A clock that goes back passes no time.
         let passed = now.saturating_sub(self.last.unwrap_or(now));
         self.last = Some(self.last.map_or(now, |last| last.max(now)));
@@ -120,8 +110,8 @@ impl SlewLimit {
         };
         let (force, force_asked) = part(0, &self.force);
         let (torque, torque_asked) = part(3, &self.torque);
-        self.rendered = join(&force, &torque);
-        Slewed {
+        self.rendered = stack(&force, &torque);
+        Limited {
             wrench: self.rendered,
             force_asked,
             torque_asked,
