@@ -141,6 +141,7 @@ impl DeviceLoop {
 }
 
 /// Sums over the sessions of a run.
+#[derive(Default)]
 pub(crate) struct Totals {
     pub(crate) sessions: u32,
     pub(crate) first_tick: Option<Duration>,
@@ -149,18 +150,4 @@ pub(crate) struct Totals {
     pub(crate) period: Durations,
     pub(crate) packets: ClientCounters,
     pub(crate) realtime: Vec<RealtimeGrant>,
-}
-
-impl Totals {
-    pub(crate) fn new() -> Self {
-        Self {
-            sessions: 0,
-            first_tick: None,
-            last_tick: Duration::ZERO,
-            missed: 0,
-            period: Durations::new(),
-            packets: ClientCounters::default(),
-            realtime: Vec::new(),
-        }
-    }
 }

@@ -11,15 +11,14 @@ use crate::verdict::{said_of_kept, said_of_misses, said_of_safety_events, verdic
 /// A histogram of durations from 1 us to 60 s with three digits. Recording does not allocate.
 pub(crate) struct Durations(Histogram<u64>);
 
-impl Durations {
-    const MAX_US: u64 = 60_000_000;
-    const DIGITS: u8 = 3;
-
-    pub(crate) fn new() -> Self {
+impl Default for Durations {
+    fn default() -> Self {
         // The bounds are constants that the crate accepts: 1 <= low, 2 low <= high, digits <= 5.
-        Self(Histogram::new_with_bounds(1, Self::MAX_US, Self::DIGITS).expect("valid bounds"))
+        Self(Histogram::new_with_bounds(1, 60_000_000, 3).expect("valid bounds"))
     }
+}
 
+impl Durations {
     pub(crate) fn record(&mut self, duration: Duration) {
         let us = u64::try_from(duration.as_micros()).unwrap_or(u64::MAX);
         self.0.saturating_record(us);

@@ -12,7 +12,7 @@ const SUGGESTION_SIMILARITY: f64 = 0.7;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownDevice {
     /// No kind of that name; the nearest, in a sentence's end, or nothing.
-    #[error("there is no device `{0}`{1}; use {}", names_and_forms())]
+    #[error("there is no device `{0}`{1}; use {forms}", forms = names_and_forms())]
     Name(String, String),
     /// The kind needs more than its name: what to write.
     #[error("the device `{0}` is incomplete; write {1}")]

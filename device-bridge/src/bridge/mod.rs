@@ -136,7 +136,7 @@ fn run_loop(
         rejoiner,
         runtime,
         over,
-        totals: Totals::new(),
+        totals: Totals::default(),
         build: &mut build,
     };
     run.sessions(first, bridge)

@@ -39,11 +39,7 @@ impl<T> LoopThread<T> {
     }
 
     /// Asks the loop to end, and waits until the force is gone; nothing where the loop broke down.
-    fn end(mut self) -> Option<T> {
-        self.join()
-    }
-
-    fn join(&mut self) -> Option<T> {
+    fn end(&mut self) -> Option<T> {
         self.end.store(true, Ordering::Relaxed);
         self.thread.take()?.join().ok()
     }
@@ -51,7 +47,7 @@ impl<T> LoopThread<T> {
 
 impl<T> Drop for LoopThread<T> {
     fn drop(&mut self) {
-        let _ = self.join(); // there is nobody to give it to
+        let _ = self.end(); // there is nobody to give it to
     }
 }
 
@@ -221,7 +217,7 @@ impl Run<'_> {
             }
         ));
         bridge.begin_session(source, edge);
-        let thread = self.start_device_loop(&link, bridge, period, sender)?;
+        let mut thread = self.start_device_loop(&link, bridge, period, sender)?;
 
         let dead_after = self.rejoiner.policy().dead_after;
         let mut watch = LinkWatch::new(Instant::now(), dead_after.unwrap_or(link.node_timeout()));
@@ -276,7 +272,7 @@ impl Run<'_> {
             period,
             priority: self.args.priority,
             core: self.args.core,
-            totals: std::mem::replace(&mut self.totals, Totals::new()),
+            totals: std::mem::take(&mut self.totals),
         };
         let thread = thread::Builder::new()
             .name("taut-bridge-dev".to_owned())
@@ -467,7 +463,7 @@ mod tests {
             },
             safety: *bridge.port().settings(),
             wishes: Arc::default(),
-            totals: Totals::new(),
+            totals: Totals::default(),
             build: &mut build,
         };
         run.wishes.wish(ArmWish::Disarm);

@@ -251,10 +251,7 @@ mod tests {
     use super::*;
 
     fn controller() -> PassivityController {
-        let settings = PassivitySettings {
-            mode: Passivity::Control,
-            ..PassivitySettings::default()
-        };
+        let settings = PassivitySettings::of(Passivity::Control);
         PassivityController::new(settings, ContactBound::default())
     }
 
