@@ -97,7 +97,7 @@ fn damaged_lines(lines: u64) -> (u64, u64) {
     };
     let line = |time| truth(time).line().expect("short enough").to_vec();
     damaged(lines, line, |time, line| {
-        let Ok(frame) = Frame::parse(line) else {
+        let Some(frame) = Frame::parse(line) else {
             return false;
         };
         let [x, y, z] = frame.position.map(|part| (part / 1e-5) as i16);

@@ -39,65 +39,37 @@ pub struct Frame {
     pub info: i32,
 }
 
-/// Why a line is not used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BrokenFrame {
-    /// Not the bytes of the board's lines, with the line's end last.
-    #[error("a line of the Polhem board has neither {LINE} bytes nor {SHORT_LINE}")]
-    Length,
-    /// Not eight numbers.
-    #[error("a line of the Polhem board has not eight numbers")]
-    Numbers,
-    /// A number that cannot be.
-    #[error("a line of the Polhem board has a number that cannot be")]
-    OutOfRange,
-}
-
 impl Frame {
-    /// Reads a line of 64 bytes, its end included.
-    ///
-    /// # Errors
-    /// [`BrokenFrame`].
-    pub fn parse(line: &[u8]) -> Result<Self, BrokenFrame> {
+    /// Reads a line of 64 bytes, its end included; `None` where it has other bytes, not eight numbers, or one that cannot be.
+    #[must_use]
+    pub fn parse(line: &[u8]) -> Option<Self> {
         Self::of(line, LINE)
     }
 
     /// The same of a board whose lines have so many bytes.
-    fn of(line: &[u8], bytes: usize) -> Result<Self, BrokenFrame> {
-        let [text @ .., b'\n'] = line else {
-            return Err(BrokenFrame::Length);
-        };
+    fn of(line: &[u8], bytes: usize) -> Option<Self> {
+        let text = line.strip_suffix(b"\n")?;
         // Behind the numbers is another line's end; before them may be what is left of the line before.
         let text = text.trim_ascii();
         if line.len() != bytes || text.contains(&b'\n') {
-            return Err(BrokenFrame::Length);
+            return None;
         }
-        let text = str::from_utf8(text).map_err(|_| BrokenFrame::Numbers)?;
+        let text = str::from_utf8(text).ok()?;
         let mut words = text.split(' ').filter(|word| !word.is_empty());
-        let mut numbers = [0.0; 7];
+        let mut numbers = [0.0_f64; 7];
         for number in &mut numbers {
-            let word = words.next().ok_or(BrokenFrame::Numbers)?;
+            let word = words.next()?;
             // Digits alone: no `inf`, no exponent.
             let is_plain = word
                 .bytes()
                 .all(|byte| byte.is_ascii_digit() || b"+-.".contains(&byte));
-            let read: Option<f64> = word.parse().ok();
-            *number = read.filter(|_| is_plain).ok_or(BrokenFrame::Numbers)?;
+            *number = word.parse().ok().filter(|_| is_plain)?;
         }
-        let info = words
-            .next()
-            .and_then(|word| word.parse().ok())
-            .ok_or(BrokenFrame::Numbers)?;
-        if words.next().is_some() {
-            return Err(BrokenFrame::Numbers);
-        }
+        let info = words.next()?.parse().ok()?;
         let [x, y, z, angles @ ..] = numbers;
         let fits = [x, y, z].iter().all(|mm| mm.abs() <= FARTHEST_MM)
             && angles.iter().all(|angle| angle.abs() <= LARGEST_ANGLE);
-        if !fits {
-            return Err(BrokenFrame::OutOfRange);
-        }
-        Ok(Self {
+        (fits && words.next().is_none()).then_some(Self {
             position: [x, y, z].map(|mm| mm * 1e-3),
             angles,
             info,
@@ -111,7 +83,7 @@ impl Frame {
         loop {
             let read = |from: usize, bytes: usize| {
                 let line = buffer.get(from..from + bytes)?;
-                Self::of(line, bytes).ok()
+                Self::of(line, bytes)
             };
             let in_a_row = |bytes: &usize| read(0, *bytes).and(read(*bytes, *bytes)).is_some();
             *length = length.or_else(|| [LINE, SHORT_LINE].into_iter().find(in_a_row));
@@ -252,21 +224,22 @@ mod tests {
     fn what_is_no_line_is_refused() {
         let good = line("12.5 -3.25 0.125 0.1 -0.2 0.3 -0.4 1");
         for at in 0..good.len() {
-            assert!(Frame::parse(&good[..at]).is_err(), "cut at {at}");
+            assert_eq!(Frame::parse(&good[..at]), None, "cut at {at}");
             let mut long = good.clone();
             long.insert(at, b' ');
-            assert_eq!(Frame::parse(&long), Err(BrokenFrame::Length));
+            assert_eq!(Frame::parse(&long), None);
         }
-        for (text, why) in [
-            ("1 2 3 0 0 0 0", BrokenFrame::Numbers),
-            ("1 2 3 0 0 0 0 0 0", BrokenFrame::Numbers),
-            ("1 2 3 0 0 0 nan 0", BrokenFrame::Numbers),
-            ("1 2 inf 0 0 0 0 0", BrokenFrame::Numbers),
-            ("1 2 3e2 0 0 0 0 0", BrokenFrame::Numbers),
-            ("1 2 900 0 0 0 0 0", BrokenFrame::OutOfRange),
-            ("1 2 3 0 0 0 70 0", BrokenFrame::OutOfRange),
+        assert!(Frame::parse(&line("1 2 3 0 0 0 0 0")).is_some());
+        for text in [
+            "1 2 3 0 0 0 0",
+            "1 2 3 0 0 0 0 0 0",
+            "1 2 3 0 0 0 nan 0",
+            "1 2 inf 0 0 0 0 0",
+            "1 2 3e2 0 0 0 0 0",
+            "1 2 900 0 0 0 0 0",
+            "1 2 3 0 0 0 70 0",
         ] {
-            assert_eq!(Frame::parse(&line(text)), Err(why), "{text}");
+            assert_eq!(Frame::parse(&line(text)), None, "{text}");
         }
         assert_eq!(read_force(&line("1 2 3 2 0 0")), None);
         assert_eq!(read_force(&line("1 2 3 0 0 0 0")), None, "currents");
@@ -295,10 +268,7 @@ mod tests {
                     buffer.extend(bytes);
                     found.extend(Frame::newest(&mut buffer, &mut length));
                 }
-                let is_good = |read: &Frame| {
-                    let sent = Frame::parse(&line(read.info));
-                    sent.is_ok_and(|sent| sent == *read)
-                };
+                let is_good = |read: &Frame| Frame::parse(&line(read.info)) == Some(*read);
                 assert!(found.iter().all(is_good), "at {at}: {found:?}");
                 assert_eq!(found.last().map(|read| read.info), Some(5), "at {at}");
             }

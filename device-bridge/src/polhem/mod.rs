@@ -14,5 +14,5 @@ mod frame;
 mod simulated;
 
 pub(crate) use board::start;
-pub use frame::{BrokenFrame, Frame, force_frame, read_force};
+pub use frame::{Frame, force_frame, read_force};
 pub use simulated::SimulatedPolhem;
