@@ -1,7 +1,5 @@
 //! A simulated string-driven device put together: which geometry, where its frame stands, and whether a hand's path stays inside.
 
-use std::path::PathBuf;
-
 use nalgebra::{Point3, UnitQuaternion};
 use taut_plant::{Hand, MinJerkPath, Tremor};
 use taut_spidar::{
@@ -22,15 +20,10 @@ const NOTICED: f64 = 0.1;
 pub enum StringsError {
     /// Neither shipped nor readable.
     #[error(
-        "{named}: cannot be read: {cause}; give a geometry file, or one of the shipped devices: {}",
-        Geometry::shipped_names().collect::<Vec<_>>().join(", ")
+        "{0}: cannot be read: {1}; give a geometry file, or one of the shipped devices: {shipped}",
+        shipped = Geometry::shipped_names().collect::<Vec<_>>().join(", ")
     )]
-    Unreadable {
-        /// What was asked for.
-        named: String,
-        /// What the system says.
-        cause: std::io::Error,
-    },
+    Unreadable(String, std::io::Error),
     /// A file that is no geometry.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
@@ -68,12 +61,8 @@ pub fn string_geometry(named: &str) -> Result<Geometry, StringsError> {
     if let Some(geometry) = Geometry::shipped(named) {
         return Ok(geometry);
     }
-    let text = std::fs::read_to_string(PathBuf::from(named)).map_err(|cause| {
-        StringsError::Unreadable {
-            named: named.to_owned(),
-            cause,
-        }
-    })?;
+    let unreadable = |cause| StringsError::Unreadable(named.to_owned(), cause);
+    let text = std::fs::read_to_string(named).map_err(unreadable)?;
     Ok(Geometry::parse(named, &text)?)
 }
 
@@ -105,10 +94,8 @@ pub fn simulated_spidar(
     let centre = middle(&path, &reference_point);
     let placement = SpidarPlacement::around(centre, turned, half_way(&path), reference_point);
     let warning = examine(&geometry, &placement, &path)?;
-    let mut hardware = HeldStrings::new(&geometry, StringLosses::default(), placement, hand, path);
-    if let Some(tremor) = tremor {
-        hardware = hardware.with_tremor(tremor);
-    }
+    let losses = StringLosses::default();
+    let hardware = HeldStrings::new(&geometry, losses, placement, hand, path, tremor);
     // Counting began with the grip at the centre.
     let encoders = Encoders::calibrated(&geometry, &Pose::identity(), &[0; STRINGS]);
     Ok(SimulatedSpidar {

@@ -164,7 +164,7 @@ fn seen(name: &str, hand: Hand, moving: f64, losses: StringLosses, fate: Fate) -
         reference_point(),
     );
     let hardware = Counting {
-        held: HeldStrings::new(&geometry, losses, placement, hand, intention),
+        held: HeldStrings::new(&geometry, losses, placement, hand, intention, None),
         stopped: None,
         stop: false,
     };

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use crate::support::faulty::Faulty;
 use crate::support::floor::{Direct, OnFloor, Wire, damaged, floor, placement};
+use crate::support::ms;
 use crate::support::stage::{BAD_LINE, VICE, no_write_jumps, opened};
-use crate::support::{ms, wait_until};
 use taut_bridge::polhem::{Frame, SimulatedPolhem, force_frame};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::Counters;
@@ -21,19 +21,9 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
     let plug = || PseudoTerminal::start_shared(Arc::clone(&arm), Some(&link)).expect("a terminal");
     let terminal = plug();
     let device = opened(&format!("polhem:{}", link.display())).expect("it is there");
-    let mut held = OnFloor::new(device, &placement(), floor);
-    held.until_felt("the floor");
-    held.until("the floor at the arm", |_, _| {
-        terminal.device().held().rendered().z > 0.3
-    });
-
-    drop(terminal);
-    held.until_gone("the cable is out");
-    let terminal = plug();
-    held.until_felt("the cable is in");
-    drop(held);
-    wait_until("a force stayed", || {
-        terminal.device().held().rendered().norm() == 0.0
+    let held = OnFloor::new(device, &placement(), floor);
+    held.outlives(terminal, plug, |terminal| {
+        terminal.device().held().rendered().norm()
     });
 }
 

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use crate::support::faulty::Faulty;
 use crate::support::floor::{OnFloor, damaged, placement};
+use crate::support::ms;
 use crate::support::stage::{BAD_LINE, Faults, HANGS, Inside, VICE, no_write_jumps, opened};
-use crate::support::{ms, wait_until};
 use nalgebra::{Isometry3, Vector3, Vector6};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::{BoardInfo, Counters, Cycle, SimulatedBoards};
@@ -65,18 +65,16 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
         let terminal = plug();
         let device = opened(&format!("spidar:{}", link.display())).expect("it is there");
         // The frame's y is up, as the workbench's z is.
-        let mut held = OnFloor::new(device, &placement(), floor::<2>);
-        held.until_felt("the floor");
-
-        drop(terminal);
-        held.until_gone("the cable is out");
-        let terminal = plug();
-        held.until_felt("the cable is in");
-        let is_slack = || *terminal.device().digits() == [0; STRINGS];
-        held.until("currents at the boards", |_, _| !is_slack());
-
-        drop(held);
-        wait_until("a current stayed", is_slack);
+        let held = OnFloor::new(device, &placement(), floor::<2>);
+        held.outlives(terminal, plug, |terminal| {
+            let largest = terminal
+                .device()
+                .digits()
+                .map(i16::unsigned_abs)
+                .into_iter()
+                .max();
+            f64::from(largest.unwrap_or(0))
+        });
     }
 }
 

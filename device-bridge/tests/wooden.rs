@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::support::floor::{Direct, OnFloor, Wire, damaged, floor, placement};
+use crate::support::ms;
 use crate::support::stage::opened;
-use crate::support::{ms, wait_until};
 use nalgebra::Vector3;
 use taut_bridge::spidar_uart::Counters;
 use taut_bridge::wooden::{
@@ -32,19 +32,9 @@ fn a_floor_is_felt_through_the_reports_and_again_after_the_cable_was_out() {
         let device = opened(&choice).expect("it is there");
         let sensed = if model == "polhem-1" { 6 } else { 3 };
         assert_eq!(device.info().sensed_degrees_of_freedom, sensed);
-        let mut held = OnFloor::new(device, &placement(), floor);
-        held.until_felt("the floor");
-        held.until("the floor at the arm", |_, _| {
-            service.arm().held().rendered().z > 0.3
-        });
-
-        drop(service);
-        held.until_gone("the cable is out");
-        let service = plug();
-        held.until_felt("the cable is in");
-        drop(held);
-        wait_until("a force stayed", || {
-            service.arm().held().rendered().norm() == 0.0
+        let held = OnFloor::new(device, &placement(), floor);
+        held.outlives(service, plug, |service| {
+            service.arm().held().rendered().norm()
         });
     }
 }

@@ -52,23 +52,21 @@ impl HeldStrings {
         placement: SpidarPlacement,
         hand: Hand,
         path: MinJerkPath,
+        tremor: Option<Tremor>,
     ) -> Self {
         let path = path.map(|pose| at_point(pose, &placement.reference_point));
         let grip = string_grip(geometry, &placement);
+        let plant = Plant::new(grip, hand, path);
         Self {
             strings: SimulatedStrings::new(geometry, losses, Pose::identity()),
-            plant: Plant::new(grip, hand, path),
+            plant: match tremor {
+                Some(tremor) => plant.with_tremor(tremor),
+                None => plant,
+            },
             placement,
             epoch: None,
             elapsed: Duration::ZERO,
         }
-    }
-
-    /// Lets the hand tremble: in free space the grip moves by exactly this displacement. Only a hand that holds the grip trembles.
-    #[must_use]
-    pub fn with_tremor(mut self, tremor: Tremor) -> Self {
-        self.plant = self.plant.with_tremor(tremor);
-        self
     }
 
     /// Replaces the hand, such as by [`Hand::RELEASED`]; pose and velocity go on.

@@ -235,6 +235,13 @@ mod tests {
 
     #[test]
     fn what_no_device_is_is_refused() {
+        const NUMBERS: [fn(&mut RawInfo) -> &mut f64; 5] = [
+            |info| &mut info.max_force,
+            |info| &mut info.max_torque,
+            |info| &mut info.max_stiffness,
+            |info| &mut info.max_rotational_stiffness,
+            |info| &mut info.rate,
+        ];
         assert_eq!(PluginInfo::of(&INFO).expect("it fits").name.len(), 64);
         for (sensed, actuated) in [(0, 0), (3, 6), (6, 4), (7, 6), (u32::MAX, 3)] {
             let info = RawInfo {
@@ -248,29 +255,11 @@ mod tests {
             );
         }
         for bad in [f64::INFINITY, f64::NAN, -1.0, 0.0, 1e9] {
-            for info in [
-                RawInfo {
-                    max_force: bad,
-                    ..INFO
-                },
-                RawInfo {
-                    max_torque: bad,
-                    ..INFO
-                },
-                RawInfo {
-                    max_stiffness: bad,
-                    ..INFO
-                },
-                RawInfo {
-                    max_rotational_stiffness: bad,
-                    ..INFO
-                },
-                RawInfo { rate: bad, ..INFO },
-            ] {
-                assert!(
-                    matches!(PluginInfo::of(&info), Err(Claim::Number { .. })),
-                    "{bad}"
-                );
+            for number in NUMBERS {
+                let mut info = INFO;
+                *number(&mut info) = bad;
+                let refused = PluginInfo::of(&info);
+                assert!(matches!(refused, Err(Claim::Number { .. })), "{bad}");
             }
         }
         // Without motors nothing is said of them.

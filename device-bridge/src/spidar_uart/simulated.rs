@@ -50,10 +50,7 @@ impl SimulatedBoards {
     ) -> Result<Self, BoardsError> {
         let path = path.unwrap_or_else(|| MinJerkPath::sway(Isometry3::identity(), SWAY.0, SWAY.1));
         let placement = SpidarPlacement::default();
-        let mut held = HeldStrings::new(geometry, StringLosses::default(), placement, hand, path);
-        if let Some(tremor) = tremor {
-            held = held.with_tremor(tremor);
-        }
+        let losses = StringLosses::default();
         let known = |board, model| BoardInfo::of_model(model).map(|info| (board, info));
         let boards = if one_board {
             [known(0, 7), None]
@@ -63,7 +60,7 @@ impl SimulatedBoards {
         Ok(Self {
             boards: boards.into_iter().flatten().collect(),
             digits_per_newton: digits_per_newton(geometry)?,
-            held,
+            held: HeldStrings::new(geometry, losses, placement, hand, path, tremor),
             begun: None,
             digits: [0; STRINGS],
             offsets,

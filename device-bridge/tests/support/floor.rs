@@ -10,7 +10,7 @@ use taut_bridge::{
     SafetySettings,
 };
 
-use super::{PATIENCE, ms};
+use super::{PATIENCE, ms, wait_until};
 
 /// A device whose port ticks on a floor.
 pub struct OnFloor {
@@ -74,6 +74,19 @@ impl OnFloor {
 
     pub fn until_gone(&mut self, what: &str) {
         self.until(what, |fault, force| fault.is_some() && force == 0.0);
+    }
+
+    /// The floor is felt, here and at the far end of `cable`, is gone without it and is back with another; nothing stays at the far end without a port.
+    pub fn outlives<T>(mut self, cable: T, plug: impl Fn() -> T, far: impl Fn(&T) -> f64) {
+        self.until_felt("the floor");
+        self.until("the floor at the far end", |_, _| far(&cable) > 0.3);
+        drop(cable);
+        self.until_gone("the cable is out");
+        let cable = plug();
+        self.until_felt("the cable is in");
+        self.until("the floor at the far end again", |_, _| far(&cable) > 0.3);
+        drop(self);
+        wait_until("a force stayed", || far(&cable) == 0.0);
     }
 
     /// Ticks once a millisecond of the virtual clock, after `wire`. Since when the force was zero at the end, ms.
