@@ -23,13 +23,8 @@ pub enum OfferError {
     #[error("the server's coupling cannot be used: {0}; install the same release on both sides")]
     Settings(#[from] SettingsError),
     /// Mass, inertia, radius, a surface or a pose is none.
-    #[error(
-        "the server's coupling has {what} that is none; install the same release on both sides"
-    )]
-    Invalid {
-        /// What it is.
-        what: &'static str,
-    },
+    #[error("the server's coupling has {0} that is none; install the same release on both sides")]
+    Invalid(&'static str),
 }
 
 /// What a server with this world, whose obstacles `moving` move, offers its bridge, `set_rate_hz` sets a second; the reason where it keeps the coupling.
@@ -125,9 +120,7 @@ fn wire_surface(obstacle: &Obstacle) -> Option<EdgeSurface> {
 pub fn world_of(offer: &EdgeCoupling) -> Result<(World, Settings), OfferError> {
     let positive = |value: f64, what| {
         let positive = value.is_finite() && value > 0.0;
-        positive
-            .then_some(value)
-            .ok_or(OfferError::Invalid { what })
+        positive.then_some(value).ok_or(OfferError::Invalid(what))
     };
     let mass = positive(offer.mass, "a mass")?;
     let radius = positive(offer.radius, "a radius")?;
@@ -135,9 +128,7 @@ pub fn world_of(offer: &EdgeCoupling) -> Result<(World, Settings), OfferError> {
     let inertia = Matrix3::from_row_slice(&offer.inertia);
     let definite = inertia == inertia.transpose() && inertia.cholesky().is_some();
     if !definite {
-        return Err(OfferError::Invalid {
-            what: "an inertia tensor",
-        });
+        return Err(OfferError::Invalid("an inertia tensor"));
     }
     let mut reference_point = Point3::from(offer.reference_point);
     if !reference_point.iter().all(|x| x.is_finite()) {
@@ -163,14 +154,11 @@ pub fn world_of(offer: &EdgeCoupling) -> Result<(World, Settings), OfferError> {
 }
 
 fn obstacle(surface: &EdgeSurface) -> Result<Obstacle, OfferError> {
-    let pose = surface.pose.to_isometry().ok_or(OfferError::Invalid {
-        what: "an obstacle's pose",
-    })?;
+    let pose = surface.pose.to_isometry();
+    let pose = pose.ok_or(OfferError::Invalid("an obstacle's pose"))?;
     let friction = surface.friction;
     if !(friction.is_finite() && friction >= 0.0) {
-        return Err(OfferError::Invalid {
-            what: "a coefficient of friction",
-        });
+        return Err(OfferError::Invalid("a coefficient of friction"));
     }
     let texture = surface.sine.map(sine).transpose()?.map(Texture::Sine);
     Ok(Obstacle {
@@ -198,7 +186,7 @@ fn sine(sine: EdgeSine) -> Result<SineTexture, OfferError> {
             wavelength: sine.wavelength,
             amplitude: sine.amplitude,
         })
-        .ok_or(OfferError::Invalid { what: "a texture" })
+        .ok_or(OfferError::Invalid("a texture"))
 }
 
 /// A regular tetrahedron with its corners at `radius` around `center`, m.
@@ -212,7 +200,7 @@ fn tetrahedron(center: &Point3<f64>, radius: f64) -> Result<Mesh, OfferError> {
         corner(-1.0, -1.0, 1.0),
     ];
     let faces = vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
-    Mesh::new(corners, faces).map_err(|_| OfferError::Invalid { what: "a size" })
+    Mesh::new(corners, faces).map_err(|_| OfferError::Invalid("a size"))
 }
 
 #[cfg(test)]

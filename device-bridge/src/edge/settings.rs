@@ -58,9 +58,7 @@ pub(super) fn to_wire(settings: &Settings) -> Result<EdgeSettings, NotAtEdge> {
 /// [`OfferError`]: one is out of its range.
 pub(super) fn from_wire(wire: &EdgeSettings) -> Result<Settings, OfferError> {
     if wire.max_constraints as usize > MAX_SET_ROWS {
-        return Err(OfferError::Invalid {
-            what: "a number of rows",
-        });
+        return Err(OfferError::Invalid("a number of rows"));
     }
     let settings = converted!(
         *wire,
@@ -79,7 +77,7 @@ pub(super) fn from_wire(wire: &EdgeSettings) -> Result<Settings, OfferError> {
 mod tests {
     use super::*;
     use taut_link::proto::control::{ControlMessage, LENGTH_BYTES};
-    use taut_link::proto::{CouplingOffer, EdgeCoupling, PoseF64, coupling::EdgeSurface};
+    use taut_link::proto::{CouplingOffer, EdgeCoupling};
 
     /// Every field differs from the default of every size.
     fn unusual() -> Settings {
@@ -131,17 +129,8 @@ mod tests {
 
     fn offer(settings: EdgeSettings) -> EdgeCoupling {
         EdgeCoupling {
-            mass: 1.0,
-            inertia: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            reference_point: [0.0; 3],
-            radius: 0.1,
             settings,
-            set_rate_hz: 1000.0,
-            obstacles: vec![EdgeSurface {
-                pose: PoseF64::IDENTITY,
-                friction: 0.0,
-                sine: None,
-            }],
+            ..crate::edge::offer()
         }
     }
 

@@ -1,8 +1,5 @@
 //! The buttons of a device that mean something to the port: the dead-man's, and the one that arms.
 
-/// Buttons that a sample can tell of.
-const BUTTONS: u32 = u16::BITS;
-
 /// Watches two buttons. A number beyond the buttons is a button that nobody can hold.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Buttons {
@@ -39,7 +36,7 @@ impl Buttons {
 }
 
 fn is_in(buttons: u16, number: u8) -> bool {
-    u32::from(number) < BUTTONS && buttons >> number & 1 == 1
+    u32::from(number) < u16::BITS && buttons >> number & 1 == 1
 }
 
 #[cfg(test)]
