@@ -36,7 +36,6 @@ pub struct TickOutput {
     pub events: Events,
 }
 
-/// What the ticks have seen.
 #[derive(Default)]
 pub(crate) struct TickStats {
     pub(crate) ticks: u64,
@@ -128,7 +127,6 @@ impl BridgeLoop {
         }
     }
 
-    /// Counts on from there.
     pub(crate) fn go_on_from(&mut self, past: Past) {
         self.stats = past.stats;
         self.passed = past.passed;
@@ -145,7 +143,6 @@ impl BridgeLoop {
         self.passed.as_ref().map(|passed| passed.statistics())
     }
 
-    /// The fault that the device is in.
     pub(crate) fn fault(&self) -> Option<DeviceFault> {
         self.port.fault()
     }
@@ -163,7 +160,6 @@ impl BridgeLoop {
         self.port.restart(source);
     }
 
-    /// Whether constraint sets are wanted.
     pub(crate) fn couples(&self) -> bool {
         self.edge.is_some()
     }
@@ -284,7 +280,6 @@ impl BridgeLoop {
         }
     }
 
-    /// Counts what a tick of the port did.
     fn note(&mut self, now: Duration, report: &TickReport) {
         let (stats, wrench) = (&mut self.stats, &report.wrench);
         stats.max_force = stats.max_force.max(wrench.fixed_rows::<3>(0).norm());
@@ -316,7 +311,6 @@ impl BridgeLoop {
     }
 }
 
-/// The command that arrived, for the port.
 fn command(newest: &Newest) -> Command {
     let wrench = if newest.command.flags & WRENCH_PAUSED == 0 {
         Vector6::from(newest.command.wrench)

@@ -23,7 +23,6 @@ use crate::report::Durations;
 use crate::service_manager::Turns;
 use crate::signals::EndFlag;
 
-/// What the device loop has to tell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Notice {
     /// By the port.

@@ -132,7 +132,6 @@ impl PlayedHand {
     }
 }
 
-/// Why no device is played.
 #[derive(Debug, thiserror::Error)]
 enum SimulateError {
     #[error(

@@ -104,7 +104,6 @@ pub fn simulated_spidar(
     })
 }
 
-/// Times along a path.
 fn times(path: &MinJerkPath) -> impl Iterator<Item = f64> {
     let end = path.end_s();
     (0..=SAMPLES).map(move |sample| end * f64::from(sample) / f64::from(SAMPLES))

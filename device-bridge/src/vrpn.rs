@@ -97,9 +97,6 @@ impl TrackerFeed {
     }
 
     /// The same for several readers of one connection.
-    ///
-    /// # Errors
-    /// As [`Self::start`].
     pub fn start_for<const READERS: usize>(source: VrpnSource) -> std::io::Result<[Self; READERS]> {
         let buffers = std::array::from_fn::<_, READERS, _>(|_| {
             triple_buffer::TripleBuffer::new(&TrackerState::default()).split()
@@ -155,7 +152,6 @@ impl fmt::Debug for TrackerFeed {
     }
 }
 
-/// Why a connection ended.
 #[derive(Debug, thiserror::Error)]
 enum Lost {
     #[error("{0}")]
@@ -172,7 +168,6 @@ enum Lost {
     Protocol(#[from] taut_vrpn::ClientError),
 }
 
-/// A connection at work.
 struct Connection {
     client: Client,
     stream: TcpStream,
@@ -180,7 +175,6 @@ struct Connection {
     datagrams: Option<UdpSocket>,
 }
 
-/// The thread's own.
 struct Listener {
     source: VrpnSource,
     outputs: Vec<triple_buffer::Input<TrackerState>>,

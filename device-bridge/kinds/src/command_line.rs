@@ -47,9 +47,6 @@ pub enum UnknownDevice {
 }
 
 /// Reads a device of the command line.
-///
-/// # Errors
-/// [`UnknownDevice`].
 pub fn read_choice(text: &str) -> Result<Chosen, UnknownDevice> {
     let end = text.find([':', ',', '=']).unwrap_or(text.len());
     let (name, rest) = text.split_at(end);

@@ -19,7 +19,6 @@ const MAX_SWEEPS: usize = 200;
 /// A sweep that changes no force by more than this share of the largest limit is the last.
 const FORCE_TOLERANCE: f64 = 1e-15;
 
-/// Friction over one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Friction {
     /// Held over the step.

@@ -52,7 +52,6 @@ pub(crate) struct BoxProgram {
     gram: [[f64; STRINGS]; STRINGS],
 }
 
-/// A solution.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoxAnswer {
     pub(crate) x: PerString,

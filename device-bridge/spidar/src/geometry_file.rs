@@ -33,7 +33,6 @@ impl std::fmt::Display for GeometryError {
     }
 }
 
-/// Reads the text of a geometry file.
 pub(crate) fn read(file: &str, text: &str) -> Result<Geometry, GeometryError> {
     let mut reader = Reader {
         text,

@@ -35,7 +35,6 @@ const WRONG_MINIMUM: f64 = 0.2;
 pub const NEAREST_MOTOR: f64 = 10e-3;
 /// Strings cross beyond this rotation from rest, rad.
 pub const LARGEST_ROTATION: f64 = std::f64::consts::FRAC_PI_2;
-/// A pose has so many components.
 const COMPONENTS: usize = 6;
 
 /// A pose, and how well the lengths agree on it.

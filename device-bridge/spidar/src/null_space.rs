@@ -12,12 +12,10 @@
 
 use crate::{PerString, STRINGS};
 
-/// Components of a wrench.
 const COMPONENTS: usize = 6;
 /// A diagonal entry of R below this share of the largest: a direction of wrench that the strings hardly render.
 const SINGULAR: f64 = 1e-6;
 
-/// The factors of one pose.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NullSpace {
     /// N, by columns.

@@ -47,7 +47,6 @@ impl Ray {
     };
 }
 
-/// One pose's problem.
 pub(crate) struct Search {
     pub(crate) program: BoxProgram,
     pub(crate) bounds: Bounds,

@@ -209,7 +209,6 @@ fn slice(geometry: &Geometry, turned: bool, right: usize, up: usize) -> Slice {
     }
 }
 
-/// One pose under examination.
 struct Probe {
     strings: StringMatrix,
     solver: TensionSolver,

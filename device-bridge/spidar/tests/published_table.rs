@@ -8,7 +8,6 @@ use taut_spidar::{
     ForwardKinematics, Pose, StringMatrix, TensionSettings, TensionSolver, capability,
 };
 
-/// Largest and mean of some figures.
 #[derive(Default)]
 struct Figures {
     sum: f64,

@@ -40,7 +40,6 @@ use crate::report::BridgeReport;
 use crate::service_manager::ServiceNotifier;
 use crate::signals::EndFlag;
 
-/// How often the watching thread looks.
 const WATCH_PERIOD: Duration = Duration::from_millis(20);
 
 /// Runs a bridge until `--duration`, a signal, the end of its trace, or until the server says that it stops. A server that is lost ends it
@@ -66,9 +65,6 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
 
 /// Runs a bridge on a device that the caller makes, once the scene is known, until `stop` is set or as [`run`] ends; or until another scene comes.
 /// `--device`, `--hand` and `--path` of `args` are not looked at; signals and the console are the caller's.
-///
-/// # Errors
-/// [`BridgeError`].
 pub fn run_device(
     args: &BridgeArgs,
     stop: Arc<AtomicBool>,

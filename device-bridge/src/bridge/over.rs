@@ -20,9 +20,7 @@ pub(super) struct Over {
 /// What the bridge does over and over, for the service manager. While it joins or opens its device, both count as going round.
 #[derive(Clone, Default)]
 pub(super) struct Alive {
-    /// The device loop.
     pub(super) device: Turns,
-    /// Who watches it.
     pub(super) watch: Turns,
 }
 

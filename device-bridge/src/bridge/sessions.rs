@@ -51,7 +51,6 @@ impl<T> Drop for LoopThread<T> {
     }
 }
 
-/// Why a session ended.
 enum SessionEnd {
     Duration,
     Signal,
@@ -64,7 +63,6 @@ enum SessionEnd {
     ServerLost(String),
 }
 
-/// A bridge at work.
 pub(super) struct Run<'a> {
     pub(super) args: &'a BridgeArgs,
     /// The device was placed in it.

@@ -285,7 +285,6 @@ mod tests {
     use crate::ms;
     use crate::port::{ArmingState, Command, DevicePort, SafetySettings};
 
-    /// Says what a test wants.
     struct Said(Arc<Mutex<ArmState>>);
 
     impl ArmPort for Said {

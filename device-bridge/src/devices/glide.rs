@@ -41,7 +41,6 @@ pub(super) struct Glide {
 }
 
 impl Glide {
-    /// At rest at `pose`.
     pub(super) fn at_rest(pose: Pose) -> Self {
         Self {
             from: pose,

@@ -40,7 +40,6 @@ impl HeldArm {
         }
     }
 
-    /// At rest where the path begins, once more.
     pub(crate) fn begin_again(&mut self) {
         self.plant = self.begin.clone();
     }

@@ -32,7 +32,6 @@ impl Pace {
         }
     }
 
-    /// A reading came.
     pub(crate) fn read(&mut self) {
         let now = monotonic_now();
         if let Some(last) = self.last.replace(now) {
@@ -40,7 +39,6 @@ impl Pace {
         }
     }
 
-    /// A cycle that began at `begun` is over.
     pub(crate) fn cycle(&mut self, begun: Duration) {
         record(&mut self.cycles, monotonic_now().saturating_sub(begun));
     }

@@ -39,9 +39,6 @@ impl PluginSettings {
     }
 
     /// Loads the library and opens its device.
-    ///
-    /// # Errors
-    /// [`PluginError`].
     pub fn open(&self, placement: Placement, priority: u8) -> Result<ArmDevice, PluginError> {
         let (plugin, info) = Plugin::open(&self.path, &self.language, &self.options, priority)?;
         let arm = ArmSettings {

@@ -98,7 +98,6 @@ pub(super) struct RateControl {
 }
 
 impl RateControl {
-    /// A body at rest at its start.
     pub(super) fn new(settings: CapSettings, placement: Placement) -> Self {
         let start = placement.at_reference_point(&placement.start);
         Self {
@@ -112,7 +111,6 @@ impl RateControl {
         }
     }
 
-    /// Metres of the world that a metre on the workbench is.
     pub(super) fn scale(&self) -> f64 {
         self.placement.scale()
     }

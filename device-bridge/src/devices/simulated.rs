@@ -15,7 +15,6 @@ use crate::placement::{at_point, off_point};
 /// Grid of the simulation: a tenth of a 1 kHz tick.
 const STEP: Duration = Duration::from_micros(100);
 
-/// Sample rate of the simulated device.
 const RATE_HZ: f64 = 1000.0;
 
 /// Delay of the force by the loop itself, assumed for the stated stability limits: one tick, as in a loop that computes the

@@ -51,9 +51,6 @@ impl SpidarUartSettings {
     }
 
     /// Opens the boards; the grip is taken to be at the centre of the frame, not turned, and there the body starts. Lengths are the world's.
-    ///
-    /// # Errors
-    /// [`SpidarUartError`].
     #[cfg(unix)]
     pub fn open(
         &self,
@@ -83,9 +80,6 @@ impl SpidarUartSettings {
     }
 
     /// Nothing can be opened here.
-    ///
-    /// # Errors
-    /// [`SpidarUartError::NotHere`].
     #[cfg(not(unix))]
     pub fn open(
         &self,

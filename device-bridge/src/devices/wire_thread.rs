@@ -60,7 +60,6 @@ pub(crate) trait Wire: Send + 'static {
 
 /// A state that says whether the device is there.
 pub(crate) trait WireState: Copy + Default + Send + 'static {
-    /// The device is gone.
     fn lose(&mut self);
 }
 
@@ -109,7 +108,6 @@ impl<S: WireState, C: Copy + Send> Line<S, C> {
         Arc::clone(&self.end)
     }
 
-    /// Hands the state on.
     pub(crate) fn publish(&mut self) {
         self.out.write(self.state);
         if let Some(pace) = &mut self.pace {
@@ -237,7 +235,6 @@ impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
         Ok(port)
     }
 
-    /// What the device said last.
     pub(crate) fn newest(&mut self) -> &S {
         self.newest.read()
     }

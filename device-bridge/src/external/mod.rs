@@ -133,7 +133,6 @@ impl WrenchReader {
     }
 }
 
-/// The value that is felt.
 #[derive(Clone, Copy, Debug)]
 struct Taken {
     wrench: Vector6,
@@ -194,7 +193,6 @@ impl ExternalWrench {
         &self.statistics
     }
 
-    /// The same by other settings from now on.
     pub(crate) fn set_settings(&mut self, settings: ExternalWrenchSettings) {
         self.settings = settings;
     }

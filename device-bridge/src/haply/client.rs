@@ -46,7 +46,6 @@ pub enum HaplyError {
     Thread(#[from] ThreadError),
 }
 
-/// Why a connection ended.
 #[derive(Debug, thiserror::Error)]
 enum Lost {
     #[error("{0}")]
@@ -104,7 +103,6 @@ pub(crate) fn start(
     )?)
 }
 
-/// The thread's own.
 struct Talker {
     address: ServiceAddress,
     exchange: Exchange,

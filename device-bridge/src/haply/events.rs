@@ -35,7 +35,6 @@ const RETRY: Duration = Duration::from_secs(2);
 /// Between two looks whether it is over.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// How much it matters, as the service says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Level {
@@ -47,7 +46,6 @@ enum Level {
     Panic,
 }
 
-/// A message, as it came.
 #[derive(Deserialize)]
 struct Raw {
     name: String,

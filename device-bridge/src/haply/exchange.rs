@@ -166,7 +166,6 @@ impl Exchange {
         );
     }
 
-    /// The state after `said`.
     fn judge(&mut self, said: &Said) -> Result<ArmState, Unusable> {
         let id = self.arm.as_deref().ok_or(Unusable::NotPlugged)?;
         let arm = said

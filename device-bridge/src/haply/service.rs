@@ -67,9 +67,6 @@ impl HaplyService {
     }
 
     /// The same with another answer to `GET /version`.
-    ///
-    /// # Errors
-    /// As [`Self::start`].
     pub fn start_as(
         address: SocketAddr,
         inverse: SimulatedInverse,

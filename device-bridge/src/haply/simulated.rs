@@ -51,7 +51,6 @@ impl SimulatedSettings {
     }
 }
 
-/// A session's force.
 #[derive(Clone, Copy, Debug)]
 struct Push {
     force: Vector3<f64>,

@@ -51,9 +51,6 @@ impl Display for ServiceVersion {
 }
 
 /// Asks the service for its version, `GET /version`; waits at most two seconds.
-///
-/// # Errors
-/// [`VersionError`].
 pub(super) fn check_version(address: &ServiceAddress) -> Result<(), VersionError> {
     let unknown = |cause: String| VersionError::Unknown(address.clone(), cause);
     let agent: ureq::Agent = ureq::Agent::config_builder()

@@ -8,22 +8,18 @@
 use super::Answer;
 use super::claims::{PluginInfo, RawInfo, RawSample, Worth};
 
-/// Bytes of a request.
 pub(super) const REQUEST: usize = 49;
 /// Bytes before an answer's content.
 pub(super) const HEAD: usize = 5;
 /// Most bytes of an answer's content: a text.
 pub(super) const MAX_CONTENT: usize = 16 << 10;
-/// Bytes of a sample.
 const SAMPLE: usize = 14 * 8 + 2 * 4;
-/// Bytes of the information.
 const INFO: usize = 64 + 2 * 4 + 5 * 8;
 /// Code of the information.
 const IS_INFO: u8 = 10;
 /// Code of a text that says what went wrong.
 const IS_ERROR: u8 = 11;
 
-/// What is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ask {
     Read,
@@ -31,7 +27,6 @@ pub(super) enum Ask {
     Close,
 }
 
-/// What was answered.
 pub(super) enum Said {
     /// To a read or a write; a sample to a read that brought one.
     Answer(Answer, Option<RawSample>),

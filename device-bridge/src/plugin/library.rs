@@ -16,7 +16,6 @@ use super::{Answer, OpenDevice, Opener, PluginError};
 
 /// `TAUT_DEVICE_VERSION`.
 const VERSION: u32 = 1;
-/// The one symbol.
 const ENTRY: &str = "taut_device_entry";
 /// Longest text of an error that is read, with its end.
 const TEXT: usize = 256;
@@ -105,7 +104,6 @@ struct Fitting {
 }
 
 impl PluginLibrary {
-    /// Loads `path` and asks for its table.
     fn load(path: &Path) -> Result<Self, PluginError> {
         let whole = path.canonicalize().map_err(|error| {
             PluginError::Missing(path.to_owned(), error.to_string(), "plugin:/path/lib.so")

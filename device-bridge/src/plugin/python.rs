@@ -20,7 +20,6 @@ use super::{Answer, OpenDevice, Opener, PluginError};
 use crate::realtime::monotonic_now;
 use crate::signals::interrupt;
 
-/// The program of the process.
 const HOST: &str = include_str!("taut_host.py");
 /// For the interpreter, the file's imports and its `open`.
 const OPEN_WITHIN: Duration = Duration::from_secs(9);
@@ -33,7 +32,6 @@ const CLOSE_WITHIN: Duration = Duration::from_millis(500);
 /// Between two looks whether it is over.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// A file, and what runs it.
 pub(super) struct PythonFile {
     interpreter: PathBuf,
     path: PathBuf,
@@ -118,7 +116,6 @@ struct Process {
     child: Child,
     link: UnixStream,
     printed: Printed,
-    /// What went wrong.
     wrong: String,
     end: Arc<AtomicBool>,
     /// It has ended, or is about to.
@@ -300,7 +297,6 @@ impl Drop for Process {
     }
 }
 
-/// Why there is no answer.
 enum Silence {
     Hangs,
     Ended,

@@ -28,9 +28,6 @@ pub struct Plugin {
 
 impl Plugin {
     /// Loads what is at `path`, written in `language`, and opens its device with `options`; `priority` asks for real time, 0 does not.
-    ///
-    /// # Errors
-    /// [`PluginError`].
     pub fn open(
         path: &Path,
         language: &Language,
@@ -81,7 +78,6 @@ impl ArmPort for Plugin {
     }
 }
 
-/// The thread's own.
 struct Talker {
     opener: Box<dyn Opener>,
     calls: Calls,

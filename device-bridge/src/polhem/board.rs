@@ -45,7 +45,6 @@ pub(crate) fn start(path: &str, priority: u8) -> Result<ArmThread, InputError> {
     )?)
 }
 
-/// The thread's own.
 struct Serial {
     path: String,
     /// For the first session.

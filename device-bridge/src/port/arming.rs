@@ -165,7 +165,6 @@ impl Arming {
         self.state
     }
 
-    /// Share of the wrench that is let through now.
     pub(super) fn gain(&self) -> f64 {
         self.gain
     }

@@ -275,7 +275,6 @@ impl DevicePort {
         }
     }
 
-    /// Reads the device.
     fn sense(&mut self, now: Duration) -> Reading {
         let reading = self.device.read(now);
         let verdict = match self.check.judge(now, reading) {
@@ -380,7 +379,6 @@ impl DevicePort {
         slewed.wrench
     }
 
-    /// Tells which limits begin to act.
     fn tell_limits(&mut self, now: Duration, limited: &Limited, slewed: &Limited, debt: f64) {
         let felt = self.arming.gain() > 0.0;
         // A force that comes or goes away is slow on purpose; why it does is told by itself.

@@ -290,13 +290,11 @@ pub(super) struct TickEvents {
 }
 
 impl TickEvents {
-    /// Forgets the last tick's.
     pub(super) fn begin_tick(&mut self, now: Duration) {
         self.now = now;
         self.events = Events::default();
     }
 
-    /// Tells one.
     pub(super) fn tell(&mut self, kind: EventKind, value: f64) {
         self.count += 1;
         self.events.push(SafetyEvent {
@@ -307,7 +305,6 @@ impl TickEvents {
         });
     }
 
-    /// What was told in this tick.
     pub(super) fn events(&self) -> &Events {
         &self.events
     }

@@ -6,7 +6,6 @@ use nalgebra::Vector6;
 
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample};
 
-/// No device.
 pub(super) struct Gone(DeviceInfo);
 
 impl Gone {

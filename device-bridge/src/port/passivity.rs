@@ -106,7 +106,6 @@ pub(super) struct PassivityController {
     obstacles: Option<f64>,
 }
 
-/// What the controller adds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Damping {
     /// N, N m.

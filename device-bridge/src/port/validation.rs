@@ -70,7 +70,6 @@ impl Default for ValidationSettings {
     }
 }
 
-/// What a reading is worth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
     /// A new sample that may be followed.
@@ -123,7 +122,6 @@ impl SampleCheck {
         }
     }
 
-    /// Judges what the device gave at `now`.
     pub(super) fn judge(
         &mut self,
         now: Duration,

@@ -55,7 +55,6 @@ impl Command {
     }
 }
 
-/// Which input grew too old.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Missing {
     /// No new command.
@@ -66,14 +65,12 @@ pub(super) enum Missing {
     NotOnClock,
 }
 
-/// Whether the newest command may be rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Freshness {
     /// In full.
     Fresh,
     /// No more.
     Stale {
-        /// What is missing.
         missing: Missing,
         /// Its age, or by how much it is ahead.
         age: Duration,
@@ -82,7 +79,6 @@ pub(super) enum Freshness {
     },
 }
 
-/// How fresh `command` is at `now`.
 pub(super) fn freshness(now: Duration, command: &Command, settings: &SafetySettings) -> Freshness {
     let ahead = command.origin.saturating_sub(now);
     if ahead > settings.hold {

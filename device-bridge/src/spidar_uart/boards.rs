@@ -20,7 +20,6 @@ use crate::devices::wire_thread::{HOLDS, Line, Wire, WireState, WireThread, tick
 use crate::realtime::monotonic_now;
 use crate::serial_port::{self, Port, PortError};
 
-/// Of the boards.
 const BAUD: u32 = 2_000_000;
 /// An answer that is not there by then is none: a busy machine is late by some milliseconds, cycle after cycle, and half of [`HOLDS`] harms no promise.
 const ANSWER_WITHIN: Duration = Duration::from_millis(10);
@@ -42,7 +41,6 @@ const LOOK: Duration = Duration::from_millis(1);
 /// Cycles of zero currents at an end, in case one is lost.
 const LAST_CYCLES: u32 = 3;
 
-/// What the thread hands on.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counted {
     readings: u64,
@@ -66,9 +64,6 @@ pub struct SpidarBoards {
 
 impl SpidarBoards {
     /// Opens the line and looks for the boards; `priority` asks for real time, 0 does not. Waits for the first counts.
-    ///
-    /// # Errors
-    /// [`BoardsError`].
     pub fn open(path: &str, geometry: &Geometry, priority: u8) -> Result<Self, BoardsError> {
         let digits_per_newton = digits_per_newton(geometry)?;
         let count = geometry
@@ -129,7 +124,6 @@ impl StringHardware for SpidarBoards {
 
 type BoardLine = Line<Counted, [i16; STRINGS]>;
 
-/// The thread's own.
 struct Serial {
     path: String,
     /// For the first session.

@@ -37,9 +37,6 @@ pub struct SimulatedBoards {
 impl SimulatedBoards {
     /// Two boards of four motors, or one of eight, on strings of this geometry; the grip begins at the centre of the frame, where the
     /// counters are at `offsets`.
-    ///
-    /// # Errors
-    /// [`BoardsError::NoVolts`].
     pub fn new(
         geometry: &Geometry,
         hand: Hand,

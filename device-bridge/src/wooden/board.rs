@@ -53,7 +53,6 @@ pub(crate) fn start(
     )?)
 }
 
-/// The thread's own.
 struct Talker {
     path: Option<PathBuf>,
     /// For the first session.

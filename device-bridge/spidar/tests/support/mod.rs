@@ -4,12 +4,10 @@ use nalgebra::{Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 use taut_spidar::{Geometry, PerString, Pose, StringMatrix};
 pub(crate) use taut_test_kit::strings::{Random, apart, motion};
 
-/// A shipped geometry.
 pub(crate) fn shipped(name: &str) -> Geometry {
     Geometry::shipped(name).unwrap_or_else(|| panic!("{name} is shipped"))
 }
 
-/// The shipped geometries.
 pub(crate) fn all() -> Vec<Geometry> {
     Geometry::shipped_names().map(shipped).collect()
 }

@@ -46,7 +46,6 @@ pub struct SpaceMouse {
     seen: (u64, Duration),
     was_open: bool,
     wrench: Vector6<f64>,
-    /// Ends the thread when it is dropped.
     _reader: OwnThread,
 }
 

@@ -41,7 +41,6 @@ fn faults() -> impl Strategy<Value = Vec<(Fault, u64, f64)>> {
     prop::collection::vec((fault, 1_u64..200, -30.0..30.0_f64), 1..12)
 }
 
-/// A fault while it lasts.
 struct Episode {
     fault: Fault,
     begun: Duration,
