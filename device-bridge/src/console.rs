@@ -1,7 +1,7 @@
 //! What a process prints on standard output. Lines while it runs go by [`taut_log`], whose thread loses them rather than time.
 
 use std::io::{self, Write};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 /// How long a report may take to be written: a terminal that is stopped shall not keep a process that is told to end. A pipe takes a report at once, and
@@ -49,18 +49,15 @@ pub fn report(text: impl Into<String>) -> bool {
 fn written_in_time(out: impl Write + Send + 'static, text: String) -> io::Result<()> {
     let (progress, answer) = sync_channel(2);
     let thread = std::thread::Builder::new().name("report".to_owned());
-    thread.spawn(move || write(out, text, &progress))?;
+    thread.spawn(move || {
+        let _ = progress.send(Ok(())); // it begins
+        let _ = progress.send(write_line(out, text)); // or who waited has given up
+    })?;
     // A busy machine may be slow to start the thread: that is no terminal's fault and does not count.
     let _ = answer.recv();
     answer
         .recv_timeout(REPORT_TIME)
         .unwrap_or(Err(io::ErrorKind::TimedOut.into()))
-}
-
-/// Sends when it begins, and how the writing ended.
-fn write(out: impl Write, text: String, progress: &SyncSender<io::Result<()>>) {
-    let _ = progress.send(Ok(()));
-    let _ = progress.send(write_line(out, text)); // who waited has given up
 }
 
 #[cfg(test)]

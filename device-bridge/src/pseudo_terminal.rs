@@ -34,19 +34,11 @@ pub struct PseudoTerminal<T> {
 }
 
 impl<T: FarEnd> PseudoTerminal<T> {
-    /// Opens a pseudo-terminal; `link` is a name for its path; that of a terminal that is gone is replaced.
+    /// Opens a pseudo-terminal for a device, which may outlive its cable; `link` is a name for its path; that of a terminal that is gone is replaced.
     ///
     /// # Errors
     /// No pseudo-terminal, no thread, or the link cannot be made.
-    pub fn start(device: T, link: Option<&Path>) -> std::io::Result<Self> {
-        Self::start_shared(Arc::new(Mutex::new(device)), link)
-    }
-
-    /// The same with a device that outlives its cable.
-    ///
-    /// # Errors
-    /// As [`Self::start`].
-    pub fn start_shared(device: Arc<Mutex<T>>, link: Option<&Path>) -> std::io::Result<Self> {
+    pub fn start(device: Arc<Mutex<T>>, link: Option<&Path>) -> std::io::Result<Self> {
         // First: the terminal that is opened may be the one that a dead device's link names.
         link.map_or(Ok(()), make_room)?;
         let (master, path) = open()?;
@@ -68,12 +60,6 @@ impl<T: FarEnd> PseudoTerminal<T> {
     pub fn place(&self) -> String {
         let link = self.link.as_ref().map(|link| link.display().to_string());
         link.unwrap_or_else(|| self.path.clone())
-    }
-
-    /// Of the terminal.
-    #[must_use]
-    pub fn path(&self) -> &str {
-        &self.path
     }
 
     /// The device.
@@ -159,7 +145,7 @@ mod tests {
         };
         drop(master);
         assert!(std::os::unix::fs::symlink(&path, &link).is_ok());
-        let played = PseudoTerminal::start(Silent, Some(&link));
+        let played = PseudoTerminal::start(Arc::new(Mutex::new(Silent)), Some(&link));
         let played = played.map(|played| played.place());
         assert!(
             played.is_ok_and(|place| Path::new(&place) == link),

@@ -100,37 +100,27 @@ impl Turns {
     }
 }
 
-/// The thread that tells. When this goes, the manager hears that the service stops.
-#[derive(Debug)]
-pub struct ServiceNotifier {
-    _thread: OwnThread,
-}
-
-impl ServiceNotifier {
-    /// As [`run`] and then [`stops`], in a thread of its own, until `is_over` or until this is dropped; `None` where there is nobody to tell.
-    pub fn start<const N: usize>(
-        status: &'static str,
-        turns: [Turns; N],
-        is_over: impl Fn() -> bool + Send + 'static,
-    ) -> Option<Self> {
-        if !is_there() {
-            return None;
-        }
-        let thread = OwnThread::start("notify", move |dropped| {
-            let so_far = || turns.each_ref().map(Turns::so_far);
-            run(status, so_far, || {
-                is_over() || dropped.load(Ordering::Relaxed)
-            });
-            stops();
-        });
-        match thread {
-            Ok(thread) => Some(Self { _thread: thread }),
-            Err(error) => {
-                tracing::warn!("the service manager will not be told that this runs: {error}");
-                None
-            }
-        }
+/// As [`run`] and then [`stops`], in a thread of its own, until `is_over` or until the thread is dropped; `None` where there is nobody to tell.
+pub fn start<const N: usize>(
+    status: &'static str,
+    turns: [Turns; N],
+    is_over: impl Fn() -> bool + Send + 'static,
+) -> Option<OwnThread> {
+    if !is_there() {
+        return None;
     }
+    let thread = OwnThread::start("notify", move |dropped| {
+        let so_far = || turns.each_ref().map(Turns::so_far);
+        run(status, so_far, || {
+            is_over() || dropped.load(Ordering::Relaxed)
+        });
+        stops();
+    });
+    thread
+        .inspect_err(|error| {
+            tracing::warn!("the service manager will not be told that this runs: {error}");
+        })
+        .ok()
 }
 
 /// A manager that does not listen is none.

@@ -4,6 +4,8 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
+#[cfg(unix)]
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
@@ -273,7 +275,7 @@ fn play_spidar(
     let geometry = crate::simulated_strings::string_geometry(&args.geometry)?;
     let (hand, path, tremor) = args.hand.held()?;
     let boards = SimulatedBoards::new(&geometry, hand, path, tremor, args.one_board, [0; 8])?;
-    let terminal = PseudoTerminal::start(boards, args.link.as_deref());
+    let terminal = PseudoTerminal::start(Arc::new(Mutex::new(boards)), args.link.as_deref());
     let terminal = terminal.map_err(SimulateError::Terminal)?;
     let path = terminal.place();
     play_until(
@@ -299,7 +301,7 @@ fn play_polhem(
 
     let (hand, path, tremor) = args.hand.held()?;
     let arm = SimulatedPolhem::new(hand, path, tremor);
-    let terminal = PseudoTerminal::start(arm, args.link.as_deref());
+    let terminal = PseudoTerminal::start(Arc::new(Mutex::new(arm)), args.link.as_deref());
     let terminal = terminal.map_err(SimulateError::Terminal)?;
     let path = terminal.place();
     play_until(
@@ -320,8 +322,6 @@ fn play_wooden(
     args: &PlayedWooden,
     over: impl Fn() -> bool,
 ) -> Result<PlayedReport, SimulateError> {
-    use std::sync::{Arc, Mutex};
-
     use crate::wooden::{SimulatedWooden, WoodenModel, WoodenService};
 
     let model = WoodenModel::named(&args.model);

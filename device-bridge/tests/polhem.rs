@@ -18,7 +18,7 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
     let folder = tempfile::tempdir().expect("a folder");
     let link = folder.path().join("polhem");
     let arm = Arc::new(Mutex::new(SimulatedPolhem::new(Hand::LIGHT, None, None)));
-    let plug = || PseudoTerminal::start_shared(Arc::clone(&arm), Some(&link)).expect("a terminal");
+    let plug = || PseudoTerminal::start(Arc::clone(&arm), Some(&link)).expect("a terminal");
     let terminal = plug();
     let device = opened(&format!("polhem:{}", link.display())).expect("it is there");
     let held = OnFloor::new(device, &placement(), floor);
@@ -34,7 +34,7 @@ fn no_line_to_the_board_jumps() {
     let path = MinJerkPath::hold(Pose::translation(0.01, 0.02, 0.03));
     let arm = SimulatedPolhem::new(VICE, Some(path), None);
     let line = Faulty::of(arm, SimulatedPolhem::lines, |arm| arm.held().commanded());
-    let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
+    let _terminal = PseudoTerminal::start(Arc::clone(&line), Some(&link));
     no_write_jumps(&format!("polhem:{}", link.display()), &line, &BAD_LINE);
 }
 

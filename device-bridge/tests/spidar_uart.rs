@@ -61,7 +61,7 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
         let link = folder.path().join("boards");
         let boards = Arc::new(Mutex::new(boards(one_board, [20_000; STRINGS])));
         let plug =
-            || PseudoTerminal::start_shared(Arc::clone(&boards), Some(&link)).expect("a terminal");
+            || PseudoTerminal::start(Arc::clone(&boards), Some(&link)).expect("a terminal");
         let terminal = plug();
         let device = opened(&format!("spidar:{}", link.display())).expect("it is there");
         // The frame's y is up, as the workbench's z is.
@@ -97,7 +97,7 @@ fn no_cycle_of_the_boards_jumps() {
             strings.wrench(&tensions).fixed_rows::<3>(0).into()
         },
     );
-    let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
+    let _terminal = PseudoTerminal::start(Arc::clone(&line), Some(&link));
     let choice = format!("spidar:{}", link.display());
     let faults = Faults {
         allowed: 550_000, // digits of eight motors
@@ -111,7 +111,7 @@ fn boards_that_are_gone_keep_nobody_from_an_end() {
     let folder = tempfile::tempdir().expect("a folder");
     let link = folder.path().join("boards");
     let line = Faulty::of(boards(false, [0; STRINGS]), |_| 0, |_| Vector3::zeros());
-    let _terminal = PseudoTerminal::start_shared(Arc::clone(&line), Some(&link));
+    let _terminal = PseudoTerminal::start(Arc::clone(&line), Some(&link));
     let device = opened(&format!("spidar:{}", link.display())).expect("it is there");
     line.set("mode", HANGS);
     // More than are asked before they are given up: they are looked for, for seconds.

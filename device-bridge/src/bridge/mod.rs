@@ -37,7 +37,7 @@ use crate::own_thread::ThreadError;
 use crate::placement::Placement;
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
-use crate::service_manager::ServiceNotifier;
+use crate::service_manager;
 use crate::signals::EndFlag;
 
 const WATCH_PERIOD: Duration = Duration::from_millis(20);
@@ -54,7 +54,7 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     arm_switch::listen_at_console(&wishes);
     let (alive, asked) = (Alive::default(), end.clone());
     let turns = [alive.device.clone(), alive.watch.clone()];
-    let notifier = ServiceNotifier::start("the bridge runs", turns, move || asked.is_asked());
+    let notifier = service_manager::start("the bridge runs", turns, move || asked.is_asked());
     let outcome = run_loop(args, options, end.clone(), alive, wishes, |scene| {
         build_loop(args, &motion, scene).map(Some)
     });

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use taut_bridge::service_manager::{ServiceNotifier, Turns};
+use taut_bridge::service_manager::{self, Turns};
 use taut_link::{
     ClientLink, ClientOptions, LinkError, ReceivedState, RejoinPolicy, Renewal, Role,
     SupervisedLink,
@@ -55,7 +55,7 @@ pub(super) async fn run(args: &RecordArgs) -> Result<(PathBuf, u64), Failure> {
         ..args.membership.policy()
     };
     let alive = Turns::default();
-    let notifier = ServiceNotifier::start("the recorder runs", [alive.clone()], || false);
+    let notifier = service_manager::start("the recorder runs", [alive.clone()], || false);
     let joining = SupervisedLink::join(options, policy, |_| ready(Ok::<(), LinkError>(())));
     let joined = tokio::select! {
         joined = alive.during(joining) => joined?,

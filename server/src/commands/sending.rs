@@ -3,7 +3,7 @@
 use std::future::ready;
 use std::time::{Duration, Instant};
 
-use taut_bridge::service_manager::{ServiceNotifier, Turns};
+use taut_bridge::service_manager::{self, Turns};
 use taut_link::{
     ClientLink, ClientOptions, LinkError, RejoinPolicy, Renewal, SessionEnd, SupervisedLink,
 };
@@ -51,7 +51,7 @@ pub(super) async fn run(
 ) -> Result<u64, Failure> {
     let server = options.server.clone();
     let alive = Turns::default();
-    let notifier = ServiceNotifier::start(sending.what, [alive.clone()], || false);
+    let notifier = service_manager::start(sending.what, [alive.clone()], || false);
     let joining = SupervisedLink::join(options, sending.policy, |_| ready(Ok::<(), LinkError>(())));
     let (supervised, mut link, ()) = tokio::select! {
         joined = alive.during(joining) => joined?,
