@@ -60,8 +60,7 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
         let folder = tempfile::tempdir().expect("a folder");
         let link = folder.path().join("boards");
         let boards = Arc::new(Mutex::new(boards(one_board, [20_000; STRINGS])));
-        let plug =
-            || PseudoTerminal::start(Arc::clone(&boards), Some(&link)).expect("a terminal");
+        let plug = || PseudoTerminal::start(Arc::clone(&boards), Some(&link)).expect("a terminal");
         let terminal = plug();
         let device = opened(&format!("spidar:{}", link.display())).expect("it is there");
         // The frame's y is up, as the workbench's z is.

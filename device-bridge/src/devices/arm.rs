@@ -12,52 +12,19 @@
 use std::time::Duration;
 
 use nalgebra::{Isometry3, Vector3, Vector6};
-use taut_plant::{Grip, stack};
+use taut_plant::stack;
 use taut_vrpn::{PoseReport, SensorMapping};
 
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
-use crate::devices::Anchor;
+use crate::devices::{Anchor, ArmState};
 use crate::placement::Placement;
 
 /// Of the loop around it, Hz.
-const RATE_HZ: f64 = 1000.0;
+pub(crate) const RATE_HZ: f64 = 1000.0;
 /// A state older than this is none.
 const MAX_AGE: Duration = Duration::from_millis(20);
 /// Time constant of the angular velocity, which is not measured, s.
 const TURN_LAG_S: f64 = 0.01;
-
-/// What an arm with this grip bears, in its own metres: no more than `largest_stiffness`, N/m, and no torque. Its force comes a period of the loop and as
-/// much on the wire after the reading.
-pub(crate) fn arm_limits(grip: &Grip, largest_stiffness: f64) -> DeviceLimits {
-    let (stable, _) = grip.critical_stiffness(1.0 / RATE_HZ, 2.0 / RATE_HZ);
-    DeviceLimits {
-        max_stiffness: stable.min(largest_stiffness),
-        max_rotational_stiffness: 0.0,
-        max_force: grip.max_force,
-        max_torque: 0.0,
-    }
-}
-
-/// What an arm said last: m, m/s, w x y z, its own axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ArmState {
-    /// Counts states that may be used.
-    pub reports: u64,
-    /// Whether the newest may be used now.
-    pub is_usable: bool,
-    /// How long before it was handed on the newest was measured, as far as the driver knows.
-    pub age: Duration,
-    /// Of the cursor.
-    pub position: [f64; 3],
-    /// Of the cursor.
-    pub velocity: [f64; 3],
-    /// Of the grip; `None` without one.
-    pub orientation: Option<[f64; 4]>,
-    /// Angular velocity, rad/s; `None` where it is not measured: it is taken from the orientations then.
-    pub turning: Option<[f64; 3]>,
-    /// One bit per button, bit 0 the first.
-    pub buttons: u16,
-}
 
 /// An arm, and where it stands.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,9 +10,9 @@ use taut_plant::Grip;
 use taut_vrpn::SensorMapping;
 
 use crate::choice::ForceDevice;
-use crate::devices::Anchor;
-use crate::devices::arm::{ArmDevice, ArmPort, ArmSettings, ArmState, arm_limits};
+use crate::devices::arm::{ArmDevice, ArmPort, ArmSettings};
 use crate::devices::wire_thread::ArmThread;
+use crate::devices::{Anchor, ArmState, arm_limits};
 use crate::haply::{
     self, EVENTS_PORT, ExchangeSettings, HaplyError, ServiceAddress, WORKSPACE_CENTRE,
 };

@@ -1,6 +1,7 @@
 //! The devices: simulated, recorded, at the other end of the network, and inputs without force. One file per driver.
 
 pub(crate) mod arm;
+mod arm_state;
 pub(crate) mod glide;
 pub(crate) mod haply;
 pub(crate) mod held_arm;
@@ -21,7 +22,9 @@ pub(crate) mod wire_thread;
 #[cfg(unix)]
 pub(crate) mod wooden;
 
-pub use arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
+pub use arm::{ArmDevice, ArmPort, ArmSettings};
+pub use arm_state::ArmState;
+pub(crate) use arm_state::arm_limits;
 pub use haply::HaplySettings;
 pub(crate) use haply::haply_grip;
 pub use held_strings::{HeldStrings, string_grip};

@@ -8,8 +8,8 @@ use taut_plant::Grip;
 use taut_vrpn::{Axes, SensorMapping};
 
 use crate::choice::ForceDevice;
-use crate::devices::arm::{ArmSettings, arm_limits};
-use crate::devices::{Anchor, haply_grip};
+use crate::devices::arm::ArmSettings;
+use crate::devices::{Anchor, arm_limits, haply_grip};
 
 /// Published, N/m.
 const LARGEST_STIFFNESS: f64 = 2000.0;

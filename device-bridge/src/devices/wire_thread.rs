@@ -17,8 +17,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use super::arm::{ArmPort, ArmState};
 use super::pace::Pace;
+use super::{ArmPort, ArmState};
 use crate::own_thread::ThreadError;
 use crate::realtime::{self, Ticker, monotonic_now};
 

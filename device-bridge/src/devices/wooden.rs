@@ -10,8 +10,8 @@ use taut_plant::Grip;
 use taut_vrpn::SensorMapping;
 
 use crate::choice::ForceDevice;
-use crate::devices::arm::{ArmSettings, arm_limits};
-use crate::devices::{Anchor, PolhemSettings, polhem_grip};
+use crate::devices::arm::ArmSettings;
+use crate::devices::{Anchor, PolhemSettings, arm_limits, polhem_grip};
 use crate::wooden::{WOODEN_MODELS, WoodenModel};
 
 /// An arm on a HID board.

@@ -1,7 +1,5 @@
 //! Connections to a service, one after the other, without sockets: which arm and which grip are used, what they said last, and what is said next.
 
-use std::time::Duration;
-
 use crate::devices::ArmState;
 
 use super::message::{MessageError, PERMUTATION, Said, Say};
@@ -192,12 +190,9 @@ impl Exchange {
         let mut state = ArmState {
             reports: self.state.reports + 1,
             is_usable: true,
-            age: Duration::ZERO,
             position: arm.position.ok_or(Unusable::NoPosition)?,
             velocity: arm.velocity.unwrap_or_default(),
-            orientation: None,
-            turning: None,
-            buttons: 0,
+            ..ArmState::default()
         };
         if let Some((array, id)) = &self.grip {
             let mut grips = said.grips.iter();

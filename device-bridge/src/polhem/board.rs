@@ -145,21 +145,10 @@ impl Serial {
         if self.judge.take(now, &[x, y, z, a, b, c, d, 0]).is_none() {
             return false;
         }
-        let velocity = self.before.map_or([0.0; 3], |(before, then)| {
-            let passed = now.saturating_sub(then).as_secs_f64().max(1e-4);
-            std::array::from_fn(|i| (frame.position[i] - before[i]) / passed)
-        });
-        self.before = Some((frame.position, now));
         let q = frame.orientation();
         line.state = ArmState {
-            reports: line.state.reports + 1,
-            is_usable: true,
-            age: Duration::ZERO,
-            position: frame.position,
-            velocity,
             orientation: Some([q.w, q.i, q.j, q.k]),
-            turning: None,
-            buttons: 0,
+            ..line.state.moved(&mut self.before, now, frame.position)
         };
         line.publish();
         true

@@ -61,7 +61,7 @@ struct Talker {
     judge: Counters,
     /// The newest that were believed.
     encoders: [i16; 6],
-    before: Option<(Vector3<f64>, Duration)>,
+    before: Option<([f64; 3], Duration)>,
 }
 
 impl Wire for Talker {
@@ -124,22 +124,11 @@ impl Talker {
         }
         self.encoders = report.encoders;
         let position = self.model.position(&self.encoders);
-        let velocity = self.before.map_or(Vector3::zeros(), |(before, then)| {
-            (position - before) / now.saturating_sub(then).as_secs_f64().max(1e-4)
-        });
-        self.before = Some((position, now));
+        let orientation = self.model.orientation(&self.encoders);
         line.state = ArmState {
-            reports: line.state.reports + 1,
-            is_usable: true,
-            age: Duration::ZERO,
-            position: position.into(),
-            velocity: velocity.into(),
-            orientation: self
-                .model
-                .orientation(&self.encoders)
-                .map(|q| [q.w, q.i, q.j, q.k]),
-            turning: None,
+            orientation: orientation.map(|q| [q.w, q.i, q.j, q.k]),
             buttons: u16::from(report.button),
+            ..line.state.moved(&mut self.before, now, position.into())
         };
         line.publish();
         true
