@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
+use crate::support::faulty::BAD_LINE;
 use crate::support::floor::{Dice, OnFloor, floor};
-use crate::support::stage::{BAD_LINE, Faults, HANGS, Inside, UNPLUGGED, VICE, no_write_jumps};
+use crate::support::stage::{Faults, HANGS, Inside, UNPLUGGED, VICE, no_write_jumps};
 use crate::support::{ms, wait_until};
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3, Vector6};
 use taut_bridge::haply::{

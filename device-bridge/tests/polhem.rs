@@ -4,10 +4,10 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use crate::support::faulty::Faulty;
+use crate::support::faulty::{BAD_LINE, Faulty};
 use crate::support::floor::{Direct, OnFloor, Wire, damaged, floor, placement};
 use crate::support::ms;
-use crate::support::stage::{BAD_LINE, VICE, no_write_jumps, opened};
+use crate::support::stage::{VICE, no_write_jumps, opened};
 use taut_bridge::polhem::{Frame, SimulatedPolhem, force_frame};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::Counters;

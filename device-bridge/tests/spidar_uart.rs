@@ -4,10 +4,10 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use crate::support::faulty::Faulty;
+use crate::support::faulty::{BAD_LINE, Faulty};
 use crate::support::floor::{OnFloor, damaged, placement};
 use crate::support::ms;
-use crate::support::stage::{BAD_LINE, Faults, HANGS, Inside, VICE, no_write_jumps, opened};
+use crate::support::stage::{Faults, HANGS, Inside, VICE, no_write_jumps, opened};
 use nalgebra::{Isometry3, Vector3, Vector6};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::spidar_uart::{BoardInfo, Counters, Cycle, SimulatedBoards};

@@ -280,10 +280,7 @@ mod tests {
             (
                 KindId::Wooden,
                 "model",
-                crate::wooden::WOODEN_MODELS
-                    .iter()
-                    .map(|m| m.name)
-                    .collect(),
+                crate::wooden::WOODEN_MODELS.map(|m| m.name).to_vec(),
             ),
             (
                 KindId::SpaceMouse,

@@ -6,7 +6,18 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use taut_bridge::pseudo_terminal::FarEnd;
 
-use super::stage::{GOOD, HANGS, Inside, NOT_A_NUMBER};
+use super::ms;
+use super::stage::{Faults, GOOD, HANGS, Inside, NOT_A_NUMBER};
+
+/// A line that hangs or answers what is no answer.
+pub const BAD_LINE: Faults = Faults {
+    modes: &[HANGS, NOT_A_NUMBER],
+    ticks: &[1, 3, 10, 30, 100],
+    floor: 0.003,
+    allowed: 510_000,
+    keeps_force: false,
+    patience: ms(1000),
+};
 
 /// A device at the far end of a line.
 pub struct Faulty<T> {

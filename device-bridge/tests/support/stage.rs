@@ -298,16 +298,6 @@ pub const BAD_SAMPLES: Faults = Faults {
     patience: PATIENCE,
 };
 
-/// A line that hangs or answers what is no answer.
-pub const BAD_LINE: Faults = Faults {
-    modes: &[HANGS, NOT_A_NUMBER],
-    ticks: &[1, 3, 10, 30, 100],
-    floor: 0.003,
-    allowed: 510_000,
-    keeps_force: false,
-    patience: ms(1000),
-};
-
 /// Real time for a driver, as `taut bridge` asks for it: a driver that stands for 50 ms between taking a command and writing it writes for a hand that
 /// feels nothing any more, which no driver can help.
 const DRIVER_PRIORITY: u8 = 80;
