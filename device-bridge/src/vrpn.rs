@@ -7,7 +7,6 @@
 //!
 //! Used by the device driver ([`crate::VrpnDevice`]) and for the viewer's head.
 
-use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::sync::Arc;
 use std::thread;
@@ -75,12 +74,14 @@ pub struct TrackerState {
 }
 
 /// A reader's end. Dropping the last one ends the thread.
+#[derive(Debug)]
 pub struct TrackerFeed {
     newest: triple_buffer::Output<TrackerState>,
     _thread: Arc<ListeningThread>,
 }
 
 /// Dropping it ends the thread.
+#[derive(Debug)]
 struct ListeningThread {
     end: Option<oneshot::Sender<()>>,
     thread: Option<thread::JoinHandle<()>>,
@@ -143,12 +144,6 @@ impl Drop for ListeningThread {
             // If it broke down, there is nothing left to end.
             let _ = thread.join();
         }
-    }
-}
-
-impl fmt::Debug for TrackerFeed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("TrackerFeed").finish_non_exhaustive()
     }
 }
 

@@ -20,7 +20,6 @@ use crate::own_thread::OwnThread;
 use crate::placement::Placement;
 
 /// The arm's mechanics as they are assumed: to be measured on a real one.
-#[must_use]
 pub(crate) fn haply_grip() -> Grip {
     Grip {
         mass: 0.1,                                 // kg

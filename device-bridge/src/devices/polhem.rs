@@ -15,7 +15,6 @@ use crate::devices::{Anchor, arm_limits, haply_grip};
 const LARGEST_STIFFNESS: f64 = 2000.0;
 
 /// The arm's mechanics as they are assumed: to be measured on a real one. The grip turns as lightly as a Haply's.
-#[must_use]
 pub(crate) fn polhem_grip() -> Grip {
     Grip {
         mass: 0.2,                     // kg

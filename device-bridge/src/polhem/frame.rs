@@ -141,7 +141,6 @@ pub fn force_frame(force: &[f64; 3]) -> [u8; LINE] {
 }
 
 /// [`force_frame`] in 63 bytes: a blank less.
-#[must_use]
 pub(crate) fn short_force_frame(force: &[f64; 3]) -> [u8; SHORT_LINE] {
     let frame = force_frame(force);
     let mut short = [b'\n'; SHORT_LINE];

@@ -401,7 +401,6 @@ impl Arming {
 }
 
 /// Share of a force that is left when `passed` of a way down of `ramp_out` is over: 1 to 0.
-#[must_use]
 pub(crate) fn fade_share(passed: Duration, ramp_out: Duration) -> f64 {
     (1.0 - ratio(passed, ramp_out)).max(0.0)
 }
