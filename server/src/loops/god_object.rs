@@ -27,6 +27,9 @@ use crate::shared::timing::Histogram;
 /// Sets reach a bridge that couples by itself at least this often.
 const SET_PERIOD: Duration = Duration::from_millis(1);
 
+/// Where updates are recorded, and where the rows of their sets.
+type UpdateTaps = (Tap<UpdateRecord>, Tap<ConstraintRecord>);
+
 /// Loop 1 with its ends of the shared data.
 #[derive(Debug)]
 pub struct GodObjectLoop {
@@ -44,15 +47,6 @@ pub struct GodObjectLoop {
     recording: Option<UpdateTaps>,
     fidelity: Option<Arc<FidelityWatch>>,
     statistics: Arc<GodObjectStatistics>,
-}
-
-/// Where the updates are recorded.
-#[derive(Debug)]
-pub struct UpdateTaps {
-    /// What each update was computed from, and its answer.
-    pub updates: Tap<UpdateRecord>,
-    /// The rows of its set.
-    pub constraints: Tap<ConstraintRecord>,
 }
 
 /// Where the body and what it can touch stand.
@@ -197,9 +191,9 @@ impl GodObjectLoop {
         self.snapshot.report = report;
         note_obstacles(&self.motions, &self.god_object, &mut self.snapshot.moving);
         self.contacts.publish(&self.snapshot);
-        if let Some(taps) = &mut self.recording {
+        if let Some((updates, constraints)) = &mut self.recording {
             let set = &self.snapshot.set;
-            taps.updates.push(UpdateRecord {
+            updates.push(UpdateRecord {
                 sequence: set.sequence,
                 published: self.snapshot.published,
                 device_sequence: device.sequence,
@@ -211,7 +205,7 @@ impl GodObjectLoop {
                 contacts: u32::try_from(set.constraints.len()).unwrap_or(u32::MAX),
                 gap_min: set.gap_min,
             });
-            taps.constraints.push_set(set);
+            constraints.push_set(set);
         }
     }
 

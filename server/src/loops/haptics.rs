@@ -417,8 +417,8 @@ mod tests {
     fn a_cycle_costs_its_tensions_and_every_force_since_the_cycle_before() {
         let device = Strings(DeviceInfo::ideal("strings", 6));
         let start = Pose::identity();
-        let (mut commands, readers) = wrench_command::channel();
-        let (states, _state_readers) = device_state::channel(&start);
+        let (mut commands, [newest]) = wrench_command::channel();
+        let (states, []) = device_state::channel(&start);
         let mut haptics = HapticsLoop::new(
             DevicePort::new(
                 Box::new(device),
@@ -427,7 +427,7 @@ mod tests {
                 &start,
             ),
             &start,
-            readers.haptics,
+            newest,
             states,
             Waker::default(),
             Arc::default(),

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::loops::checker::CheckCounts;
-use crate::loops::coupling::{CouplingLoop, CouplingStatistics};
-use crate::loops::god_object::{GodObjectLoop, GodObjectStatistics};
-use crate::loops::haptics::{HapticsLoop, HapticsStatistics};
+use crate::loops::coupling::CouplingStatistics;
+use crate::loops::god_object::GodObjectStatistics;
+use crate::loops::haptics::HapticsStatistics;
 use taut_bridge::ExternalWrenchStatistics;
 
 /// Handles on what each thread counts. Clones read the same counters.
@@ -21,19 +21,4 @@ pub struct Statistics {
     pub checks: Arc<CheckCounts>,
     /// A force from outside; `None` where the workbench takes none.
     pub external: Option<Arc<ExternalWrenchStatistics>>,
-}
-
-impl Statistics {
-    pub(super) fn of(
-        haptics: &HapticsLoop,
-        coupling: &CouplingLoop,
-        god_object: &GodObjectLoop,
-    ) -> Self {
-        Self {
-            haptics: haptics.statistics(),
-            coupling: coupling.statistics(),
-            god_object: god_object.statistics(),
-            ..Self::default()
-        }
-    }
 }

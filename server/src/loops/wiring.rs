@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use god_object::{Coupling, GodObject, Settings, World};
 use taut_bridge::{ArmSwitch, Device, DevicePort, ExternalWrench, SafetySettings};
-use taut_recording::{ForceRecord, HapticsRecord, Tap, Taps};
+use taut_recording::Taps;
 use taut_scene::BuiltMotion;
 
 use super::coupling::CouplingLoop;
-use super::god_object::{GodObjectLoop, UpdateTaps};
+use super::god_object::GodObjectLoop;
 use super::haptics::HapticsLoop;
 use super::shell::Waker;
 use crate::loops::statistics::Statistics;
@@ -76,27 +76,25 @@ impl WiredLoops {
         taps: Option<Taps>,
     ) -> Self {
         let start = *god_object.pose();
-        let (states, device_readers) = device_state::channel(&start);
-        let (snapshots, contact_readers) =
+        let (states, [to_follow, to_answer, sent_device, seen_device]) =
+            device_state::channel(&start);
+        let (snapshots, [to_rest_on, sent_contacts, seen_contacts, checker]) =
             contact_snapshot::channel(&start, settings.max_constraints);
-        let (wrenches, wrench_readers) = wrench_command::channel();
+        let (wrenches, [to_render, sent_wrench, seen_wrench, status]) = wrench_command::channel();
         let (shaded, shaded_reader) = shaded_acceleration::channel();
         let (felt_writer, felt) = felt_ticks::channel();
         let coupling_waker = Waker::default();
         let arm_switch = Arc::<ArmSwitch>::default();
-        let (haptics_tap, update_taps, force_tap) = by_loop(taps);
+        let taps = taps.map(|t| ((t.haptics, t.forces), (t.updates, t.constraints)));
+        let (taps, update_taps) = taps.unzip();
+        let (haptics_tap, force_tap) = taps.unzip();
 
-        let god_object = GodObjectLoop::new(
-            god_object,
-            device_readers.god_object,
-            shaded_reader,
-            snapshots,
-            update_taps,
-        );
+        let god_object =
+            GodObjectLoop::new(god_object, to_follow, shaded_reader, snapshots, update_taps);
         let coupling = CouplingLoop::new(
             Coupling::new(world, settings),
-            device_readers.coupling,
-            contact_readers.coupling,
+            to_answer,
+            to_rest_on,
             wrenches,
             shaded,
             force_tap,
@@ -104,27 +102,29 @@ impl WiredLoops {
         let haptics = HapticsLoop::new(
             DevicePort::new(device, safety, world.body.reference_point, &start),
             &start,
-            wrench_readers.haptics,
+            to_render,
             states,
             coupling_waker.clone(),
             arm_switch.clone(),
         )
         .with_recording(haptics_tap)
         .with_felt(felt_writer);
-        let statistics = Statistics::of(&haptics, &coupling, &god_object);
+        let statistics = Statistics {
+            haptics: haptics.statistics(),
+            coupling: coupling.statistics(),
+            god_object: god_object.statistics(),
+            ..Statistics::default()
+        };
+        let view = |device, contacts, wrench| SharedView {
+            device,
+            contacts,
+            wrench,
+        };
         let readers = SharedDataReaders {
-            broadcast: SharedView {
-                device: device_readers.broadcast,
-                contacts: contact_readers.broadcast,
-                wrench: wrench_readers.broadcast,
-            },
-            monitor: SharedView {
-                device: device_readers.monitor,
-                contacts: contact_readers.monitor,
-                wrench: wrench_readers.monitor,
-            },
-            checker: contact_readers.checker,
-            status: wrench_readers.status,
+            broadcast: view(sent_device, sent_contacts, sent_wrench),
+            monitor: view(seen_device, seen_contacts, seen_wrench),
+            checker,
+            status,
             felt,
         };
         Self {
@@ -188,21 +188,4 @@ impl WiredLoops {
             ..self
         }
     }
-}
-
-fn by_loop(
-    taps: Option<Taps>,
-) -> (
-    Option<Tap<HapticsRecord>>,
-    Option<UpdateTaps>,
-    Option<Tap<ForceRecord>>,
-) {
-    let Some(taps) = taps else {
-        return (None, None, None);
-    };
-    let updates = UpdateTaps {
-        updates: taps.updates,
-        constraints: taps.constraints,
-    };
-    (Some(taps.haptics), Some(updates), Some(taps.forces))
 }

@@ -363,9 +363,9 @@ mod tests {
         Publisher<WrenchCommand>,
         StateWriter,
     ) {
-        let (states, state_readers) = device_state::channel(start);
-        let (contacts, contact_readers) = contact_snapshot::channel(start, 32);
-        let (wrenches, wrench_readers) = wrench_command::channel();
+        let (states, [device]) = device_state::channel(start);
+        let (contacts, [snapshots]) = contact_snapshot::channel(start, 32);
+        let (wrenches, [wrench]) = wrench_command::channel();
         let source = HeadSource {
             rest: Pose::translation(0.0, -1.0, 1.0),
             eye_separation: 0.064,
@@ -373,9 +373,9 @@ mod tests {
         };
         let [head] = source.start(None).expect("nothing to start");
         let shared = SharedView {
-            device: state_readers.broadcast,
-            contacts: contact_readers.broadcast,
-            wrench: wrench_readers.broadcast,
+            device,
+            contacts: snapshots,
+            wrench,
         };
         let writer = StateWriter::new(shared, head, &Point3::origin(), 7);
         (states, contacts, wrenches, writer)

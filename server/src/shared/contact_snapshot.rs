@@ -78,31 +78,13 @@ impl Clone for ContactSnapshot {
     }
 }
 
-/// The reading ends, one per reader.
-#[derive(Debug)]
-pub struct ContactSnapshotReaders {
-    /// For loop 2.
-    pub coupling: Subscriber<ContactSnapshot>,
-    /// For the broadcaster.
-    pub broadcast: Subscriber<ContactSnapshot>,
-    /// For the monitor.
-    pub monitor: Subscriber<ContactSnapshot>,
-    /// For the checker.
-    pub checker: Subscriber<ContactSnapshot>,
-}
-
-/// The arrow from the god-object loop, with room for `capacity` constraints in every buffer.
-pub fn channel(
+/// The arrow from the god-object loop, with so many readers and room for `capacity` constraints in every buffer.
+pub fn channel<const READERS: usize>(
     start: &Pose,
     capacity: usize,
-) -> (Publisher<ContactSnapshot>, ContactSnapshotReaders) {
-    let (publisher, [coupling, broadcast, monitor, checker]) =
-        fanout(&ContactSnapshot::at_start(start, capacity));
-    let readers = ContactSnapshotReaders {
-        coupling,
-        broadcast,
-        monitor,
-        checker,
-    };
-    (publisher, readers)
+) -> (
+    Publisher<ContactSnapshot>,
+    [Subscriber<ContactSnapshot>; READERS],
+) {
+    fanout(&ContactSnapshot::at_start(start, capacity))
 }

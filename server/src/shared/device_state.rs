@@ -91,28 +91,9 @@ impl DeviceState {
     }
 }
 
-/// The reading ends, one per reader.
-#[derive(Debug)]
-pub struct DeviceStateReaders {
-    /// For loop 1.
-    pub god_object: Subscriber<DeviceState>,
-    /// For loop 2.
-    pub coupling: Subscriber<DeviceState>,
-    /// For the broadcaster.
-    pub broadcast: Subscriber<DeviceState>,
-    /// For the monitor.
-    pub monitor: Subscriber<DeviceState>,
-}
-
-/// The arrow from the haptics loop.
-pub fn channel(start: &Pose) -> (Publisher<DeviceState>, DeviceStateReaders) {
-    let (publisher, [god_object, coupling, broadcast, monitor]) =
-        fanout(&DeviceState::at_start(start));
-    let readers = DeviceStateReaders {
-        god_object,
-        coupling,
-        broadcast,
-        monitor,
-    };
-    (publisher, readers)
+/// The arrow from the haptics loop, with so many readers.
+pub fn channel<const READERS: usize>(
+    start: &Pose,
+) -> (Publisher<DeviceState>, [Subscriber<DeviceState>; READERS]) {
+    fanout(&DeviceState::at_start(start))
 }

@@ -65,27 +65,10 @@ impl WrenchCommand {
     }
 }
 
-/// The reading ends, one per reader.
-#[derive(Debug)]
-pub struct WrenchCommandReaders {
-    /// For loop 3.
-    pub haptics: Subscriber<WrenchCommand>,
-    /// For the broadcaster.
-    pub broadcast: Subscriber<WrenchCommand>,
-    /// For the monitor.
-    pub monitor: Subscriber<WrenchCommand>,
-    /// For the status line.
-    pub status: Subscriber<WrenchCommand>,
-}
-
-/// The arrow from the coupling to the hand.
-pub fn channel() -> (Publisher<WrenchCommand>, WrenchCommandReaders) {
-    let (publisher, [haptics, broadcast, monitor, status]) = fanout(&WrenchCommand::at_start());
-    let readers = WrenchCommandReaders {
-        haptics,
-        broadcast,
-        monitor,
-        status,
-    };
-    (publisher, readers)
+/// The arrow from the coupling to the hand, with so many readers.
+pub fn channel<const READERS: usize>() -> (
+    Publisher<WrenchCommand>,
+    [Subscriber<WrenchCommand>; READERS],
+) {
+    fanout(&WrenchCommand::at_start())
 }
