@@ -236,7 +236,7 @@ fn the_energy_of_a_hand_that_is_pushed_is_the_obstacles_and_not_the_couplings() 
     let mut most_work: f64 = 0.0;
     for _ in 0..8000 {
         session.tick(1);
-        let work = session.loops.haptics.statistics().obstacle_work();
+        let work = session.loops.haptics.statistics().obstacle_work.load();
         most_work = most_work.max(work);
     }
     let statistics = session.loops.haptics.statistics();
@@ -248,14 +248,14 @@ fn the_energy_of_a_hand_that_is_pushed_is_the_obstacles_and_not_the_couplings() 
     );
     // Two thirds of it went to the hand, which had put in nothing.
     assert!(
-        statistics.energy_injected() > 0.4 * springs,
+        statistics.energy_injected.load() > 0.4 * springs,
         "{} J",
-        statistics.energy_injected()
+        statistics.energy_injected.load()
     );
     assert!(
-        statistics.energy_generated() < 0.05 * springs,
+        statistics.energy_generated.load() < 0.05 * springs,
         "{} J",
-        statistics.energy_generated()
+        statistics.energy_generated.load()
     );
 }
 

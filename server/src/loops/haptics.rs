@@ -16,6 +16,7 @@ use taut_recording::{HapticsRecord, Tap};
 
 use super::incidents::IncidentCounts;
 use super::shell::Waker;
+use crate::shared::atomic_f64::AtomicF64;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
 use crate::shared::felt_ticks::{FeltTick, FeltWriter};
@@ -64,16 +65,16 @@ pub struct HapticsStatistics {
     pub safety_events: AtomicU64,
     /// All events of the port by kind.
     pub incidents: IncidentCounts,
-    /// Energy given to the hand beyond what it had put in, J, as the bits of an `f64`.
-    energy_injected_bits: AtomicU64,
-    /// Net work of moving obstacles on the hand, J, as the bits of an `f64`.
-    obstacle_work_bits: AtomicU64,
-    /// Energy given to the hand beyond what it and the obstacles had put in, J, as the bits of an `f64`.
-    energy_generated_bits: AtomicU64,
-    /// Norms of the force, N, and the torque, N m, that the hand feels, as the bits of an `f64`.
-    felt_bits: [AtomicU64; 2],
-    /// Largest norm of a force that the hand felt, N, as the bits of an `f64`.
-    largest_force_bits: AtomicU64,
+    /// Energy given to the hand beyond what it had put in, J.
+    pub energy_injected: AtomicF64,
+    /// Net work that moving obstacles have done on the hand, J.
+    pub obstacle_work: AtomicF64,
+    /// Energy given to the hand beyond what it and the moving obstacles had put in, J: the coupling made it.
+    pub energy_generated: AtomicF64,
+    /// Norms of the force, N, and the torque, N m, that the hand feels now.
+    felt: [AtomicF64; 2],
+    /// Largest norm of a force that the hand felt since the start, N.
+    pub largest_force: AtomicF64,
     /// The device does not answer now.
     pub device_faulty: AtomicBool,
 }
@@ -82,38 +83,16 @@ impl HapticsStatistics {
     /// Takes what the hand feels from this tick on.
     fn count_felt(&self, felt: &Vector6) {
         let norms = [linear(felt).norm(), angular(felt).norm()];
-        for (bits, norm) in self.felt_bits.iter().zip(norms) {
-            bits.store(norm.to_bits(), Ordering::Relaxed);
+        for (felt, norm) in self.felt.iter().zip(norms) {
+            felt.store(norm);
         }
-        let largest = self.largest_force().max(norms[0]); // NaN: as before
-        self.largest_force_bits
-            .store(largest.to_bits(), Ordering::Relaxed);
-    }
-
-    /// Energy given to the hand beyond what it had put in, J.
-    pub fn energy_injected(&self) -> f64 {
-        f64::from_bits(self.energy_injected_bits.load(Ordering::Relaxed))
-    }
-
-    /// Net work that moving obstacles have done on the hand, J.
-    pub fn obstacle_work(&self) -> f64 {
-        f64::from_bits(self.obstacle_work_bits.load(Ordering::Relaxed))
+        let largest = self.largest_force.load().max(norms[0]); // NaN: as before
+        self.largest_force.store(largest);
     }
 
     /// Norms of the force, N, and the torque, N m, that the hand feels now.
     pub fn felt(&self) -> [f64; 2] {
-        let value = |bits: &AtomicU64| f64::from_bits(bits.load(Ordering::Relaxed));
-        [value(&self.felt_bits[0]), value(&self.felt_bits[1])]
-    }
-
-    /// Largest norm of a force that the hand felt since the start, N.
-    pub fn largest_force(&self) -> f64 {
-        f64::from_bits(self.largest_force_bits.load(Ordering::Relaxed))
-    }
-
-    /// Energy given to the hand beyond what it and the moving obstacles had put in, J: the coupling made it.
-    pub fn energy_generated(&self) -> f64 {
-        f64::from_bits(self.energy_generated_bits.load(Ordering::Relaxed))
+        self.felt.each_ref().map(AtomicF64::load)
     }
 }
 
@@ -244,10 +223,10 @@ impl HapticsLoop {
     fn publish_obstacle_work(&self) {
         let given = self.port.energy().delivered();
         let work = self.wrench.held().obstacle_work;
-        let generated = (given - work).max(self.statistics.energy_generated()); // NaN: as before
-        let store = |bits: &AtomicU64, energy: f64| bits.store(energy.to_bits(), Ordering::Relaxed);
-        store(&self.statistics.obstacle_work_bits, work);
-        store(&self.statistics.energy_generated_bits, generated);
+        let statistics = &self.statistics;
+        let generated = (given - work).max(statistics.energy_generated.load()); // NaN: as before
+        statistics.obstacle_work.store(work);
+        statistics.energy_generated.store(generated);
     }
 
     /// What the force that was rendered now cost, and how old it is.
@@ -288,8 +267,8 @@ impl HapticsLoop {
             .device_faulty
             .store(report.reading.fault.is_some(), Ordering::Relaxed);
         statistics
-            .energy_injected_bits
-            .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
+            .energy_injected
+            .store(self.port.energy().injected());
         statistics.count_felt(&report.felt);
         self.publish_obstacle_work();
         if let Some(felt) = &mut self.felt {

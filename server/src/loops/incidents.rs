@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use taut_bridge::{EventKind, SafetyEvent};
 
+use crate::shared::atomic_f64::AtomicF64;
+
 /// How often each kind of event happened, and the newest of each. One writer; any thread may read.
 #[derive(Debug, Default)]
 pub struct IncidentCounts([Incident; EventKind::ALL.len()]);
@@ -16,8 +18,7 @@ struct Incident {
     number: AtomicU64,
     /// Its time, ns.
     time_ns: AtomicU64,
-    /// Its value, as the bits of an `f64`.
-    value_bits: AtomicU64,
+    value: AtomicF64,
 }
 
 impl IncidentCounts {
@@ -27,9 +28,7 @@ impl IncidentCounts {
         let time_ns = u64::try_from(event.time.as_nanos()).unwrap_or(u64::MAX);
         incident.number.store(event.number, Ordering::Relaxed);
         incident.time_ns.store(time_ns, Ordering::Relaxed);
-        incident
-            .value_bits
-            .store(event.value.to_bits(), Ordering::Relaxed);
+        incident.value.store(event.value);
         // Last: who sees the count grow sees the newest event too, or a newer one.
         incident.count.fetch_add(1, Ordering::Release);
     }
@@ -46,7 +45,7 @@ impl IncidentCounts {
             number: incident.number.load(Ordering::Relaxed),
             time: Duration::from_nanos(incident.time_ns.load(Ordering::Relaxed)),
             kind,
-            value: f64::from_bits(incident.value_bits.load(Ordering::Relaxed)),
+            value: incident.value.load(),
         })
     }
 }

@@ -172,7 +172,7 @@ impl Session {
             computed: self.wrench.newest(),
             contacts: self.statistics.god_object.contacts.newest(),
             felt: self.statistics.haptics.felt(),
-            largest_force: self.statistics.haptics.largest_force(),
+            largest_force: self.statistics.haptics.largest_force.load(),
             is_recorded: self.recorder.as_ref().is_some_and(Recorder::is_writing),
         });
     }

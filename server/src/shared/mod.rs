@@ -12,6 +12,7 @@
 //! Broadcast, monitor and checker read the same data and write none. Beside the arrows stand what every thread uses: session time, timing,
 //! the request to stop, and why a command failed.
 
+pub mod atomic_f64;
 pub(crate) mod clock;
 pub mod contact_snapshot;
 pub mod device_state;
