@@ -10,40 +10,18 @@ use std::time::Duration;
 
 use taut_link::proto::proof::Grant;
 use taut_link::proto::text::Printable;
-use taut_link::{Act, ClientStatus, Counters, LinkEvent, Role, Untrusted};
+use taut_link::{ClientStatus, Counters, LinkEvent, Role};
 
 use super::refusals::{Refusals, SUM_PERIOD};
 
 /// Clients that are known by name; more are never in.
 const MAX_PRESENT: usize = 4096;
 
-/// Something that belongs into the audit trail.
-#[derive(Debug)]
-enum Audit<'e> {
-    /// A client was let in.
-    Joined(&'e ClientStatus),
-    /// It is gone, by itself, because it was silent, or because it was shut out.
-    Left(&'e ClientStatus, &'e str),
-    /// One was not let in.
-    Refused {
-        address: SocketAddr,
-        node: &'e Untrusted,
-        why: &'e str,
-    },
-    /// Further ones were not let in; `None`: from many addresses.
-    RefusedMore { address: Option<IpAddr>, times: u64 },
-    /// Attempts to join were turned away before anything was read of them.
-    TurnedAway { times: u64 },
-    /// A client tried what its role may not.
-    Forbidden { who: Peer, act: Act },
-    /// An operator asked for force, or for none.
-    Arm { who: Peer, arm: bool },
-    /// A node keeps frames by itself or in step, or names forged states.
-    Frames { node: &'e str, what: &'static str },
-    /// The device port did something.
-    Port { what: &'e str, is_fault: bool },
-    /// A force from outside began or ended to be felt, or was refused.
-    External { what: &'e str },
+/// Writes an event of this name, with its fields.
+macro_rules! record {
+    ($event:expr, $($fields:tt)*) => {
+        tracing::info!(target: taut_log::AUDIT_TARGET, event = $event, $($fields)*)
+    };
 }
 
 /// A client, as the trail names it.
@@ -92,52 +70,6 @@ fn credential(status: &ClientStatus) -> String {
     }
 }
 
-impl Audit<'_> {
-    /// Writes it.
-    fn record(&self) {
-        macro_rules! record {
-            ($event:literal, $($fields:tt)*) => {
-                tracing::info!(target: taut_log::AUDIT_TARGET, event = $event, $($fields)*)
-            };
-        }
-        match self {
-            Self::Joined(status) => {
-                let who = Peer::from(*status);
-                record!("joined", node = %Field(&who.node), role = %who.role, credential = %Field(&who.credential), address = %who.address, session = who.session);
-            }
-            Self::Left(status, reason) => {
-                let who = Peer::from(*status);
-                record!("left", node = %Field(&who.node), role = %who.role, address = %who.address, session = who.session, reason);
-            }
-            Self::Refused { address, node, why } => {
-                record!("refused", node = %Field(&node.to_string()), %address, reason = why);
-            }
-            Self::RefusedMore {
-                address: Some(address),
-                times,
-            } => record!("refused", %address, times),
-            Self::RefusedMore {
-                address: None,
-                times,
-            } => record!("refused", address = "many", times),
-            Self::TurnedAway { times } => record!("turned-away", times),
-            Self::Forbidden { who, act } => {
-                record!("forbidden", node = %Field(&who.node), role = %who.role, credential = %Field(&who.credential), address = %who.address, %act);
-            }
-            Self::Arm { who, arm } => {
-                let event_is = if *arm { "arm" } else { "disarm" };
-                tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node = %Field(&who.node), role = %who.role, credential = %Field(&who.credential), address = %who.address);
-            }
-            Self::Frames { node, what } => record!("frames", node = %Field(node), what),
-            Self::External { what } => record!("wrench-in", what),
-            Self::Port { what, is_fault } => {
-                let event_is = if *is_fault { "fault" } else { "device" };
-                tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, what);
-            }
-        }
-    }
-}
-
 /// Writes the trail of one session.
 #[derive(Debug, Default)]
 pub struct AuditTrail {
@@ -152,14 +84,15 @@ impl AuditTrail {
     pub fn follow(&mut self, event: &LinkEvent, now: Duration) -> bool {
         match event {
             LinkEvent::Joined(status) => {
+                let who = Peer::from(status);
+                record!("joined", node = %Field(&who.node), role = %who.role, credential = %Field(&who.credential), address = %who.address, session = who.session);
                 if self.present.len() < MAX_PRESENT {
-                    self.present.push(status.into());
+                    self.present.push(who);
                 }
-                Audit::Joined(status).record();
             }
             LinkEvent::Left { status, reason } => {
                 self.present.retain(|who| who.session != status.session);
-                Audit::Left(status, reason).record();
+                record!("left", node = %Field(&status.node), role = %status.role, address = %status.address, session = status.session, reason);
             }
             LinkEvent::Refused {
                 address,
@@ -170,45 +103,23 @@ impl AuditTrail {
                 if !self.refusals.is_first(address.ip(), now) {
                     return false;
                 }
-                let address = *address;
-                Audit::Refused {
-                    address,
-                    node,
-                    why: text,
-                }
-                .record();
+                record!("refused", node = %Field(&node.to_string()), %address, reason = text);
             }
             LinkEvent::Forbidden { node, act, .. } => {
                 if let Some(who) = self.who(node) {
-                    Audit::Forbidden { who, act: *act }.record();
+                    record!("forbidden", node = %Field(&who.node), role = %who.role, credential = %Field(&who.credential), address = %who.address, %act);
                 }
             }
             LinkEvent::Arm { node, arm } => {
                 if let Some(who) = self.who(node) {
-                    Audit::Arm { who, arm: *arm }.record();
+                    record!(arming(*arm), node = %Field(&who.node), role = %who.role, credential = %Field(&who.credential), address = %who.address);
                 }
             }
             LinkEvent::FreeRunning { node, free } => {
-                Audit::Frames {
-                    node,
-                    what: if *free { "free-running" } else { "in-step" },
-                }
-                .record();
+                frames(node, if *free { "free-running" } else { "in-step" });
             }
-            LinkEvent::NoPlace { node } => {
-                Audit::Frames {
-                    node,
-                    what: "no-place",
-                }
-                .record();
-            }
-            LinkEvent::StatesForged { node } => {
-                Audit::Frames {
-                    node,
-                    what: "forged-states",
-                }
-                .record();
-            }
+            LinkEvent::NoPlace { node } => frames(node, "no-place"),
+            LinkEvent::StatesForged { node } => frames(node, "forged-states"),
             LinkEvent::Silent { .. } | LinkEvent::Stats { .. } | LinkEvent::Log { .. } => {}
         }
         true
@@ -216,22 +127,22 @@ impl AuditTrail {
 
     /// Takes an event of the device port.
     pub fn follow_port(&mut self, what: &str, is_fault: bool) {
-        Audit::Port { what, is_fault }.record();
+        record!(if is_fault { "fault" } else { "device" }, what);
     }
 
     /// Takes what is told of a force from outside.
     pub fn follow_external(&mut self, what: &str) {
-        Audit::External { what }.record();
+        record!("wrench-in", what);
     }
 
     /// Tells the sums that are due at session time `now`.
     pub fn look(&mut self, counters: &Counters, now: Duration) {
         for (address, times) in self.refusals.due(now) {
-            Audit::RefusedMore { address, times }.record();
+            refused_more(address, times);
         }
         let times = counters.turned_away - self.turned_away;
         if times > 0 && now >= self.looked + SUM_PERIOD {
-            Audit::TurnedAway { times }.record();
+            record!("turned-away", times);
             (self.turned_away, self.looked) = (counters.turned_away, now);
         }
     }
@@ -239,12 +150,30 @@ impl AuditTrail {
     /// Tells the sums that are left at the end.
     pub fn end(&mut self) {
         for (address, times) in self.refusals.due(Duration::MAX) {
-            Audit::RefusedMore { address, times }.record();
+            refused_more(address, times);
         }
     }
 
-    fn who(&self, node: &str) -> Option<Peer> {
-        self.present.iter().find(|who| who.node == node).cloned()
+    fn who(&self, node: &str) -> Option<&Peer> {
+        self.present.iter().find(|who| who.node == node)
+    }
+}
+
+/// What an operator asked for.
+fn arming(arm: bool) -> &'static str {
+    if arm { "arm" } else { "disarm" }
+}
+
+/// A node keeps frames by itself or in step, or names forged states.
+fn frames(node: &str, what: &str) {
+    record!("frames", node = %Field(node), what);
+}
+
+/// Further ones were not let in; `None`: from many addresses.
+fn refused_more(address: Option<IpAddr>, times: u64) {
+    match address {
+        Some(address) => record!("refused", %address, times),
+        None => record!("refused", address = "many", times),
     }
 }
 
@@ -266,20 +195,20 @@ impl PageAudit {
 
     /// Somebody who has shown the token asked for force, or for none.
     pub(crate) fn acted(&self, arm: bool, address: SocketAddr) {
-        let (event_is, node) = (if arm { "arm" } else { "disarm" }, self.node);
-        tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node, role = %Role::Operator, credential = "the page's token", %address);
+        let node = self.node;
+        record!(arming(arm), node, role = %Role::Operator, credential = "the page's token", %address);
     }
 
     /// Somebody who has shown the token asked for pictures of the screens.
     pub(crate) fn saw(&self, address: SocketAddr) {
         let node = self.node;
-        tracing::info!(target: taut_log::AUDIT_TARGET, event = "pictures", node, role = %Role::Operator, credential = "the page's token", %address);
+        record!("pictures", node, role = %Role::Operator, credential = "the page's token", %address);
     }
 
     /// Somebody who has shown the token changed the scene.
     pub(crate) fn edited(address: SocketAddr, revision: u64, what: &str) {
         let node = super::operator::NODE;
-        tracing::info!(target: taut_log::AUDIT_TARGET, event = "edit", node, role = %Role::Operator, credential = "the page's token", %address, revision, what = %Field(&Printable(what).to_string()));
+        record!("edit", node, role = %Role::Operator, credential = "the page's token", %address, revision, what = %Field(&Printable(what).to_string()));
     }
 
     /// Somebody was refused. Of one address and reason the first is told at once, further ones as a sum.
@@ -287,7 +216,7 @@ impl PageAudit {
         let node = self.node;
         let mut refusals = self.refusals.lock().unwrap_or_else(PoisonError::into_inner);
         if refusals.is_first((address.ip(), reason), now) {
-            tracing::info!(target: taut_log::AUDIT_TARGET, event = "refused", node, %address, reason);
+            record!("refused", node, %address, reason);
         }
     }
 
@@ -297,12 +226,8 @@ impl PageAudit {
         let mut refusals = self.refusals.lock().unwrap_or_else(PoisonError::into_inner);
         for (who, times) in refusals.due(now) {
             match who {
-                Some((address, reason)) => {
-                    tracing::info!(target: taut_log::AUDIT_TARGET, event = "refused", node, %address, reason, times);
-                }
-                None => {
-                    tracing::info!(target: taut_log::AUDIT_TARGET, event = "refused", node, address = "many", times);
-                }
+                Some((address, reason)) => record!("refused", node, %address, reason, times),
+                None => record!("refused", node, address = "many", times),
             }
         }
     }
