@@ -9,6 +9,8 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use taut_bridge::realtime::{RealtimeGrant, request_fifo, sharpen_timers};
 
+use crate::shared::lock::lock;
+
 /// Ahead of all normal work, behind the real-time class.
 const AHEAD_NICE: i32 = -10;
 /// A little behind normal work: a third of its share where both want a core.
@@ -96,7 +98,7 @@ impl RealtimeLedger {
     }
 
     fn pages(&self) -> MutexGuard<'_, Pages> {
-        self.0.pages.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0.pages)
     }
 
     /// Schedules the calling thread and notes the answer under the thread's `name`; false when it was refused.

@@ -5,7 +5,7 @@
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::Duration;
 
 use taut_link::proto::proof::Grant;
@@ -13,6 +13,7 @@ use taut_link::proto::text::Printable;
 use taut_link::{ClientStatus, Counters, LinkEvent, Role};
 
 use super::refusals::{Refusals, SUM_PERIOD};
+use crate::shared::lock::lock;
 
 /// Clients that are known by name; more are never in.
 const MAX_PRESENT: usize = 4096;
@@ -214,7 +215,7 @@ impl PageAudit {
     /// Somebody was refused. Of one address and reason the first is told at once, further ones as a sum.
     pub(crate) fn refused(&self, address: SocketAddr, reason: &'static str, now: Duration) {
         let node = self.node;
-        let mut refusals = self.refusals.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut refusals = lock(&self.refusals);
         if refusals.is_first((address.ip(), reason), now) {
             record!("refused", node, %address, reason);
         }
@@ -223,7 +224,7 @@ impl PageAudit {
     /// Tells the sums that are due at session time `now`; at the end, those that are left.
     pub(crate) fn look(&self, now: Duration) {
         let node = self.node;
-        let mut refusals = self.refusals.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut refusals = lock(&self.refusals);
         for (who, times) in refusals.due(now) {
             match who {
                 Some((address, reason)) => record!("refused", node, %address, reason, times),

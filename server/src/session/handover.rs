@@ -4,7 +4,7 @@
 //! the scene's start. The device that this process opened stays open; one behind a bridge stays by itself.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use god_object::nalgebra::Vector6;
@@ -15,6 +15,7 @@ use taut_scene::BuiltMotion;
 use crate::loops::god_object::Stand;
 use crate::session::setup::{DeviceOrigin, DeviceSource, SessionSetup};
 use crate::shared::clock::{SessionClock, nanoseconds};
+use crate::shared::lock::lock;
 
 /// How much the clock of a kept device is ahead of the session's, ns. Set anew for each session: a device is wrapped once, however many it serves.
 type Ahead = Arc<AtomicU64>;
@@ -143,10 +144,6 @@ impl Handover {
             *opened = device;
         }
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A device for a session that began `later` than the one before, in which it was `ahead` already if it was kept then.

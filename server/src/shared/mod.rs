@@ -19,6 +19,7 @@ pub mod device_state;
 pub mod failure;
 pub(crate) mod fanout;
 pub mod felt_ticks;
+pub(crate) mod lock;
 pub(crate) mod passed_wrench;
 pub mod shaded_acceleration;
 pub mod shutdown;

@@ -4,7 +4,7 @@
 //! device, or a workbench that lets in no operator; what the port thinks of it is the port's matter. Nothing but the token stands before disarming.
 
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use taut_bridge::{ArmSwitch, ArmWish, EventKind};
@@ -18,6 +18,7 @@ use super::scene_desk::SceneDesk;
 use crate::loops::haptics::HapticsStatistics;
 use crate::session::audit::PageAudit;
 use crate::shared::clock::SessionClock;
+use crate::shared::lock::lock;
 
 /// Age of the newest state up to which arming is asked for at all: `taut arm` waits as long for one.
 const STATE_PATIENCE: Duration = Duration::from_secs(2);
@@ -142,7 +143,7 @@ impl OperatorDesk {
     }
 
     fn watched(&self) -> MutexGuard<'_, Watched> {
-        self.watched.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.watched)
     }
 
     /// Makes the wish, and waits for an event of one of these kinds, or for a state of after the fade that `settled` makes something of. A session
@@ -161,7 +162,7 @@ impl OperatorDesk {
         self.switch.wish(wish);
         let watched = self.watched.clone();
         Box::new(move || {
-            let watched = watched.lock().unwrap_or_else(PoisonError::into_inner);
+            let watched = lock(&watched);
             let running = before.as_ref().zip(watched.seen.as_ref());
             let running =
                 running.filter(|((haptics, ..), seen)| Arc::ptr_eq(haptics, &seen.haptics));

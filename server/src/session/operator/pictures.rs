@@ -1,7 +1,7 @@
 //! Pictures of what the render nodes show, for the operator's page: asked for one lot at a time, checked, and kept until the next lot.
 
 use std::sync::mpsc::Receiver;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::Builder;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -10,6 +10,7 @@ use taut_link::{NodePicture, PictureAnswer, PictureAsker};
 use taut_observers::{Answer, Outcome};
 
 use super::picture_check::check;
+use crate::shared::lock::lock;
 
 /// Shortest time from one asking to the next: the nodes draw a frame more for each.
 const SHORTEST_PERIOD: Duration = Duration::from_secs(2);
@@ -97,16 +98,14 @@ impl PictureDesk {
             let _busy = Busy(desk.clone());
             let lot = desk.collect(&answers);
             let text = serde_json::to_string(&lot).map_err(|error| error.to_string());
-            *told.lock().unwrap_or_else(PoisonError::into_inner) = Some(text);
+            *lock(&told) = Some(text);
         };
         Builder::new()
             .name("pictures".to_owned())
             .spawn(collect)
             .map_err(|error| format!("not asked: no thread for the answers ({error})"))?;
         (state.is_busy, state.asked_at) = (true, Some(now));
-        Ok(Box::new(move || {
-            answer.lock().unwrap_or_else(PoisonError::into_inner).take()
-        }))
+        Ok(Box::new(move || lock(&answer).take()))
     }
 
     /// The picture of this number, if it is of the newest lot.
@@ -147,7 +146,7 @@ impl PictureDesk {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 }
 

@@ -4,12 +4,13 @@
 //! * Writer of what is shown: the latter.
 
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use serde::Deserialize;
 use taut_observers::{Answer, Outcome};
 
 use super::scene_view::Standing;
+use crate::shared::lock::lock;
 
 /// Answer where the one who was asked is gone.
 const NOT_TAKEN: &str = "not taken: the session ended meanwhile; look, and ask again";
@@ -173,10 +174,6 @@ fn check_revision(meant: Option<u64>, runs: u64) -> Result<(), String> {
         )),
         _ => Ok(()),
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
