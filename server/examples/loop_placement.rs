@@ -16,7 +16,6 @@ use std::time::Duration;
 
 use taut::loops::shell::Phases;
 use taut::report::SessionReport;
-use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_link::ClusterKey;
@@ -150,7 +149,7 @@ fn session(
     setup.realtime.coupling_core = cores.map(|cores| cores.1);
     let session = Session::start(setup)?;
     std::thread::sleep(Duration::from_secs(seconds.into()));
-    let (report, failure) = session.stop(&Terminal::standard_error());
+    let (report, failure) = session.stop();
     failure.map_or(Ok(report), |failure| Err(failure.into()))
 }
 

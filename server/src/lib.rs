@@ -8,7 +8,7 @@
 //! | [`session`]  | a running server: what it is made of, network, monitor, observers, from start to end              |
 //! | [`loops`]    | the threads around the method, their scheduling, and the checker of what they publish            |
 //! | [`shared`]   | the data between threads, with clock, timing and the request to stop                             |
-//! | [`report`]   | what was measured: end reports, metrics, the terminal                                            |
+//! | [`report`]   | what was measured: end reports, metrics                                                          |
 //!
 //! Imports go down this table, never up: `commands`, `session`, `report`, `loops`, `shared`.
 

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::support::{MachineWatch, PATIENCE, shipped_workbench, start_behind_relay, start_bridge};
-use taut::report::terminal::Terminal;
 use taut::session::setup::DeviceSource;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::{BridgeReport, DeviceLimits, MAX_EDGE_DELAY};
@@ -88,8 +87,8 @@ fn run(coupling: &str) -> Run {
         .unwrap_or_else(|error| panic!("{error}"));
     let waited = watch.longest_wait();
     let lost_down = relay.counts(Direction::Down).all_lost();
-    session.follow_network(&Terminal::standard_error());
-    let (_, failure) = session.stop(&Terminal::standard_error());
+    session.follow_network();
+    let (_, failure) = session.stop();
     assert!(failure.is_none());
     Run {
         errors,

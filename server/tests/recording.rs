@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use taut::commands::replay::recorded;
 use taut::report::RecordedReport;
-use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut::shared::failure::Failure;
@@ -45,7 +44,7 @@ fn record(scene: &str, directory: &Path) {
         assert!(begun.elapsed() < PATIENCE, "too few rows");
         std::thread::sleep(Duration::from_millis(20));
     }
-    let (_, failure) = session.stop(&Terminal::standard_error());
+    let (_, failure) = session.stop();
     assert_eq!(failure, None);
 }
 

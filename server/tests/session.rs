@@ -10,7 +10,6 @@ use god_object::nalgebra::Point3;
 use god_object::{Pose, Vector6};
 use taut::cli::ArmArgs;
 use taut::commands::arm;
-use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut::session::setup::{DeviceSource, SessionSetup};
@@ -87,7 +86,7 @@ fn a_loop_that_breaks_ends_the_session_without_force_and_says_why() {
         std::thread::sleep(Duration::from_millis(10));
     }
     assert!(session.is_ending(), "nobody noticed");
-    let (report, failure) = session.stop(&Terminal::standard_error());
+    let (report, failure) = session.stop();
     let failure = failure.expect("the failure was not told");
     assert!(failure.to_string().contains("haptics"), "{failure}");
     assert_eq!(failure.exit_code(), taut::shared::failure::EXIT_FAILED);
@@ -144,7 +143,7 @@ fn answer_of_a_session_that_ends(key_file: &Path) -> String {
     let begun = Instant::now();
     while !session.status_line().contains("clients 1") && !asking.is_finished() {
         assert!(begun.elapsed() < PATIENCE, "nobody joins");
-        session.follow_network(&Terminal::standard_error());
+        session.follow_network();
         std::thread::sleep(Duration::from_millis(10));
     }
     drop(session);
@@ -229,7 +228,7 @@ fn clients_see_a_plate_rise_under_the_body_and_never_into_it() {
         };
         states.len() > 200 && states.iter().any(lifted) && states.iter().any(rises)
     });
-    let (report, failure) = session.stop(&Terminal::standard_error());
+    let (report, failure) = session.stop();
     assert!(failure.is_none());
 
     for received in &states {
@@ -285,7 +284,7 @@ fn clients_see_what_is_carried_where_body_and_device_are() {
     let scene = scene_with_carried(folder.path(), 2);
     let session = Session::start(setup_of(&scene, key.clone())).expect("does not start");
     let states = received(&session, key, |states| states.len() > 100);
-    let (_, failure) = session.stop(&Terminal::standard_error());
+    let (_, failure) = session.stop();
     assert!(failure.is_none());
     for received in &states {
         let state = &received.state;
@@ -392,7 +391,7 @@ fn those_who_look_on_see_the_session_without_taut_s_client() {
             }
         }
     }
-    let (report, failure) = session.stop(&Terminal::standard_error());
+    let (report, failure) = session.stop();
     assert!(failure.is_none() && report.haptics_period_us.count > 0);
     while reader.read(&mut buffer).is_ok_and(|length| length > 0) {}
 }

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use taut::cli::{Cli, Command, TrackArgs};
-use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_link::{
@@ -134,7 +133,7 @@ fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_ba
         }
         observer.close().await;
     });
-    let (_, failure) = session.stop(&Terminal::standard_error());
+    let (_, failure) = session.stop();
     assert!(failure.is_none());
 }
 

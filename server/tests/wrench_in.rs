@@ -147,7 +147,7 @@ fn sample(link: &ClientLink, index: u64, force: f64) -> ForceSample {
 
 /// Ends the session, so that its recording is whole.
 fn end(session: Session) {
-    let (_, failure) = session.stop(&taut::report::terminal::Terminal::standard_error());
+    let (_, failure) = session.stop();
     assert!(failure.is_none());
 }
 

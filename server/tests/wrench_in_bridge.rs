@@ -3,7 +3,6 @@
 use std::process::Child;
 use std::time::{Duration, Instant};
 
-use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::BridgeReport;
@@ -51,7 +50,7 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
     let bridge = start_bridge(&server, &key_path, &path, &more);
     let source = sender(&server, &key_path, &["--wrench", "1,0,0,0,0,0"]);
     feel_and_kill(&session, source, passivity == "control");
-    let (_, failure) = session.stop(&Terminal::standard_error());
+    let (_, failure) = session.stop();
     assert!(failure.is_none());
     let report = bridge.join().expect("no panic").expect("a whole run");
     let felt = felt(folder.path());

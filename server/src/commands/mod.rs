@@ -47,7 +47,6 @@ use taut_bridge::console;
 
 use crate::cli::{CheckArgs, Cli, Command, DoctorArgs, FIRST_STEPS, ReplayArgs};
 use crate::report::SessionReport;
-use crate::report::terminal::Terminal;
 use crate::shared::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
 use crate::shared::shutdown::Shutdown;
 
@@ -90,12 +89,9 @@ pub fn main() -> ExitCode {
 }
 
 fn run(command: Command) -> Result<ExitCode> {
-    let terminal = Terminal::standard_error();
     match command {
-        Command::Demo(args) => end_session(demo::run(&args, &terminal)?, args.json, args.histogram),
-        Command::Serve(args) => {
-            end_session(serve::run(&args, &terminal)?, args.json, args.histogram)
-        }
+        Command::Demo(args) => end_session(demo::run(&args)?, args.json, args.histogram),
+        Command::Serve(args) => end_session(serve::run(&args)?, args.json, args.histogram),
         Command::Render(args) => {
             render::run(args)?;
             Ok(ExitCode::SUCCESS)

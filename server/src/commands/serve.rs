@@ -11,7 +11,6 @@ use crate::commands::recording_size;
 use crate::report::SessionReport;
 use crate::report::metrics;
 use crate::report::metrics_lines::MetricsLines;
-use crate::report::terminal::Terminal;
 use crate::session::Session;
 use crate::session::admission::AdmissionWatch;
 use crate::session::operator::Continuity;
@@ -25,10 +24,7 @@ pub(super) const HELP_ARM: &str =
     "no force yet: type arm and Enter for force, off and Enter for none (docs/safety.md)";
 
 /// Serves the workbench. The report comes with the failure, if the session broke down on the way.
-pub(super) fn run(
-    args: &ServeArgs,
-    terminal: &Terminal,
-) -> Result<(SessionReport, Option<Failure>), Failure> {
+pub(super) fn run(args: &ServeArgs) -> Result<(SessionReport, Option<Failure>), Failure> {
     let mut admission = AdmissionWatch::new(&args.config);
     let workbench = load_workbench(args)?;
     taut_log::use_directives(&directives(workbench.log));
@@ -48,40 +44,40 @@ pub(super) fn run(
         let mut session = Session::start_with(next.setup, &mut kept)?;
         session.end_with(&end);
         scene.began(&session);
-        announce(&session, terminal);
+        announce(&session);
         if let Some(sentence) = session.beginning().sentence() {
-            terminal.say(&sentence);
+            taut_log::say(&sentence);
         }
         if matches!(&workbench.device, Device::Driver(chosen) if chosen.kind.has_motors) {
             // Somebody holds it: a person arms.
-            terminal.say(HELP_ARM);
+            taut_log::say(HELP_ARM);
         }
         if let Some(directory) = &args.recording {
-            terminal.say(&recording_size::sentence(directory));
+            taut_log::say(&recording_size::sentence(directory));
         }
         let left = args
             .duration
             .map(|s| (s - begun.elapsed().as_secs_f64()).max(0.0));
         let mut other = None;
-        watch(&mut session, left, terminal, |session| {
-            admission.follow(session, terminal);
+        watch(&mut session, left, |session| {
+            admission.follow(session);
             metrics.follow(session);
-            other = scene.follow(session.age(), terminal);
+            other = scene.follow(session.age());
             other.is_none()
         });
-        terminal.end_status();
+        taut_log::end_status();
         match other {
             Some(changed) => {
-                let (report, failure) = session.make_way(terminal, &mut kept);
+                let (report, failure) = session.make_way(&mut kept);
                 if let Some(failure) = failure {
                     return Ok((report, Some(failure)));
                 }
-                terminal.say(&report.verdict());
+                taut_log::say(&report.verdict());
                 metrics.begin_again();
                 next = changed;
             }
             None => {
-                let ended = session.stop(terminal);
+                let ended = session.stop();
                 end.let_signals_kill();
                 return Ok(ended);
             }
@@ -168,35 +164,35 @@ impl MetricsOutlets {
 }
 
 /// Says where the session can be reached, and what of real time is not in force.
-pub(super) fn announce(session: &Session, terminal: &Terminal) {
+pub(super) fn announce(session: &Session) {
     if let (Some(quic), Some(udp)) = (session.quic_address(), session.udp_address()) {
-        terminal.say(&format!("serving on {quic} (control) and {udp} (poses)"));
+        taut_log::say(&format!("serving on {quic} (control) and {udp} (poses)"));
     }
     if let Some(fingerprint) = session.fingerprint() {
-        terminal.say(&format!("its fingerprint is {fingerprint}"));
+        taut_log::say(&format!("its fingerprint is {fingerprint}"));
     }
     if let Some(monitor) = session.monitor() {
         if let Some(page) = monitor.address() {
-            terminal.say(&format!("watch it in a browser: {page}"));
+            taut_log::say(&format!("watch it in a browser: {page}"));
         }
         if let Some(stream) = monitor.stream_address() {
-            terminal.say(&format!("or in the rerun viewer: rerun {stream}"));
+            taut_log::say(&format!("or in the rerun viewer: rerun {stream}"));
         }
         if let Some(file) = monitor.recording() {
-            terminal.say(&format!("what it shows is written to {}", file.display()));
+            taut_log::say(&format!("what it shows is written to {}", file.display()));
         }
     }
     for line in session.fidelity().into_iter().flat_map(FidelityPlan::lines) {
-        terminal.say(&line);
+        taut_log::say(&line);
     }
     for line in session.observers().lines() {
-        terminal.say(&line);
+        taut_log::say(&line);
     }
     if let Some(page) = session.operator() {
-        terminal.say(&page.line());
+        taut_log::say(&page.line());
     }
     for line in &session.realtime().waived {
-        terminal.say(&format!("not in force: {line}"));
+        taut_log::say(&format!("not in force: {line}"));
     }
 }
 
@@ -204,7 +200,6 @@ pub(super) fn announce(session: &Session, terminal: &Terminal) {
 pub(super) fn watch(
     session: &mut Session,
     duration: Option<f64>,
-    terminal: &Terminal,
     mut each: impl FnMut(&mut Session) -> bool,
 ) {
     let end = duration.map(Duration::from_secs_f64);
@@ -216,9 +211,9 @@ pub(super) fn watch(
         if session.is_ending() {
             return;
         }
-        session.follow_network(terminal);
+        session.follow_network();
         session.follow_operator();
-        terminal.status(session.status_line());
+        taut_log::status(session.status_line());
         let goes_on = each(session);
         if !goes_on || end.is_some_and(|end| session.age() >= end) {
             return;

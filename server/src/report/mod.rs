@@ -12,7 +12,6 @@ pub(crate) mod metrics_lines;
 mod metrics_page;
 mod replay;
 mod session;
-pub mod terminal;
 
 pub use client::ClientReport;
 pub(crate) use replay::said_of_stops;

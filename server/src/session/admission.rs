@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use taut_link::JoinPolicy;
 use taut_scene::Workbench;
 
-use crate::report::terminal::Terminal;
 use crate::session::Session;
 use crate::session::file_watch::FileWatch;
 
@@ -45,7 +44,7 @@ impl AdmissionWatch {
     }
 
     /// Looks at the file when it is time, and takes over what changed. A file that cannot be read changes nothing, and is reported once.
-    pub(crate) fn follow(&mut self, session: &Session, terminal: &Terminal) {
+    pub(crate) fn follow(&mut self, session: &Session) {
         if !self.file.is_due() {
             return;
         }
@@ -60,7 +59,7 @@ impl AdmissionWatch {
             }
             Err(error) => format!("the changed workbench file is not taken: {error}"),
         };
-        terminal.say(&line);
+        taut_log::say(&line);
         tracing::info!("{line}");
     }
 }

@@ -3,7 +3,6 @@
 use std::sync::atomic::Ordering;
 
 use crate::report::SessionReport;
-use crate::report::terminal::Terminal;
 use crate::session::monitor::{MonitorFeed, Severity};
 use crate::session::observers::ObserverServices;
 use crate::session::operator::Continuity;
@@ -13,25 +12,8 @@ use super::Session;
 
 impl Session {
     /// Ends everything and says what was measured; the failure, if something broke. The force is led down first.
-    pub fn stop(self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
-        self.conclude(terminal)
-    }
-
-    /// The same where another session begins at once: nodes, bridge and observers join that one, and it gets what is left in `kept`.
-    pub(crate) fn make_way(
-        self,
-        terminal: &Terminal,
-        kept: &mut Continuity,
-    ) -> (SessionReport, Option<Failure>) {
-        self.makes_way.store(true, Ordering::Relaxed);
-        let handover = self.handover.clone();
-        let ended = self.conclude(terminal);
-        kept.handover = Some(handover);
-        ended
-    }
-
-    fn conclude(mut self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
-        self.follow_network(terminal);
+    pub fn stop(mut self) -> (SessionReport, Option<Failure>) {
+        self.follow_network();
         self.audit.end();
         let mut report = self.report();
         report.fidelity = self.fidelity.as_ref().map(|f| f.watch.report(&f.plan));
@@ -54,12 +36,12 @@ impl Session {
             if let Some(error) = summary.failure {
                 let sentence = format!("the recording is not whole: {error}");
                 if self.makes_way.load(Ordering::Relaxed) {
-                    terminal.say(&format!("taut: {sentence}")); // the next session is none of its matter
+                    taut_log::say(&format!("taut: {sentence}")); // the next session is none of its matter
                 } else {
                     failure = failure.or(Some(Failure::Failed(sentence)));
                 }
             } else if !summary.lost.is_none() {
-                terminal.say(&format!(
+                taut_log::say(&format!(
                     "taut: the recording is not whole: the disk was too slow, and records were lost ({})",
                     summary.lost
                 ));
@@ -67,6 +49,15 @@ impl Session {
         }
         report.realtime = self.ledger.report();
         (report, failure)
+    }
+
+    /// The same where another session begins at once: nodes, bridge and observers join that one, and it gets what is left in `kept`.
+    pub(crate) fn make_way(self, kept: &mut Continuity) -> (SessionReport, Option<Failure>) {
+        self.makes_way.store(true, Ordering::Relaxed);
+        let handover = self.handover.clone();
+        let ended = self.stop();
+        kept.handover = Some(handover);
+        ended
     }
 
     /// Ends what runs; how many samples the monitor dropped. A second time it does nothing.

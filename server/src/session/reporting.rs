@@ -11,7 +11,6 @@ use crate::loops::incidents::{self};
 use crate::report::external::ExternalWrenchReport;
 use crate::report::frames::FramesReport;
 use crate::report::metrics::{self, ClientLink, Metrics};
-use crate::report::terminal::Terminal;
 use crate::report::{SessionReport, said_of_stops};
 use crate::session::monitor::Severity;
 
@@ -23,12 +22,12 @@ const STOPS_PERIOD: Duration = Duration::from_secs(10);
 impl Session {
     /// Reports what happened on the network since the last call: errors here, everything to monitor and log. Call it a few times a
     /// second.
-    pub fn follow_network(&mut self, terminal: &Terminal) {
+    pub fn follow_network(&mut self) {
         self.log_incidents();
         self.log_stops();
         if let Some(fidelity) = &mut self.fidelity {
             for line in fidelity.watch.notices(&mut fidelity.reported) {
-                terminal.say(&line);
+                taut_log::say(&line);
             }
         }
         let Some(link) = &self.link else {
@@ -45,9 +44,9 @@ impl Session {
         }
         for (severity, concerns_presence, line) in lines {
             if severity == Severity::Error {
-                terminal.say(&format!("taut: {line}"));
+                taut_log::say(&format!("taut: {line}"));
             } else if concerns_presence {
-                terminal.say(&line);
+                taut_log::say(&line);
             } else {
                 tracing::info!("{line}"); // what was said above is not said twice
             }

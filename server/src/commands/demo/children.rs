@@ -5,16 +5,19 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::loops::realtime::die_with_parent;
-use crate::report::terminal::Terminal;
+use crate::shared::lock::lock;
 
 /// Time between two looks at a child that is ending.
 const LOOK_PERIOD: Duration = Duration::from_millis(20);
+
+/// Lines that one of the children has said: several have the same to say.
+pub(super) type Said = Arc<Mutex<Vec<String>>>;
 
 /// A process that was started here.
 #[derive(Debug)]
@@ -30,11 +33,7 @@ pub(super) struct NamedChild {
 
 impl NamedChild {
     /// Starts `command` under `name`. It lives no longer than the calling thread.
-    pub(super) fn start(
-        name: &str,
-        mut command: Command,
-        terminal: &Terminal,
-    ) -> std::io::Result<Self> {
+    pub(super) fn start(name: &str, mut command: Command, said: &Said) -> std::io::Result<Self> {
         command
             .stdin(Stdio::null())
             .stdout(Stdio::null())
@@ -43,13 +42,15 @@ impl NamedChild {
         let mut process = command.spawn()?;
         let muted = Arc::new(AtomicBool::new(false));
         let reader = process.stderr.take().map(|stderr| {
-            let (terminal, muted) = (terminal.clone(), muted.clone());
+            let (said, muted) = (said.clone(), muted.clone());
             std::thread::Builder::new()
                 .name(format!("lines of {name}"))
                 .spawn(move || {
                     for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                        if !muted.load(Ordering::Relaxed) {
-                            terminal.say_once(&line);
+                        let mut said = lock(&said);
+                        if !muted.load(Ordering::Relaxed) && !said.contains(&line) {
+                            taut_log::say(&line);
+                            said.push(line);
                         }
                     }
                 })
@@ -135,8 +136,7 @@ mod tests {
 
     #[test]
     fn a_child_that_ends_is_waited_for_and_one_that_does_not_is_killed() {
-        let terminal = Terminal::standard_error();
-        let start = |name, script| NamedChild::start(name, shell(script), &terminal);
+        let start = |name, script| NamedChild::start(name, shell(script), &Said::default());
         let (Ok(short), Ok(long)) = (start("short", "exit 3"), start("long", "exec sleep 600"))
         else {
             panic!("sh does not start");
@@ -149,9 +149,7 @@ mod tests {
 
     #[test]
     fn an_end_is_told_once() {
-        let Ok(mut child) =
-            NamedChild::start("quick", shell("exit 2"), &Terminal::standard_error())
-        else {
+        let Ok(mut child) = NamedChild::start("quick", shell("exit 2"), &Said::default()) else {
             panic!("sh does not start");
         };
         let status = loop {

@@ -15,14 +15,13 @@ use taut_bridge::signals::EndFlag;
 use taut_scene::{Device, HeadTracking, Scene, Workbench};
 
 use crate::cli::DemoArgs;
-use crate::commands::demo::children::{NamedChild, wait_or_kill};
+use crate::commands::demo::children::{NamedChild, Said, wait_or_kill};
 use crate::commands::demo::directory::DemoDirectory;
 use crate::commands::demo::ports::use_free_ports;
 use crate::commands::serve::{HELP_ARM, announce, watch};
 use crate::commands::{recording_size, render};
 use crate::loops::realtime::after_parent;
 use crate::report::SessionReport;
-use crate::report::terminal::Terminal;
 use crate::session::Session;
 use crate::session::monitor::MonitorFeed;
 use crate::session::setup::DeviceSource;
@@ -41,10 +40,7 @@ const HELP_MOUSE: &str = "mouse in the first window: left button moves the body 
 const BRIDGE_NODE: &str = "bridge";
 
 /// Runs the demo. The report comes with the failure, if the session broke down on the way.
-pub(super) fn run(
-    args: &DemoArgs,
-    terminal: &Terminal,
-) -> Result<(SessionReport, Option<Failure>), Failure> {
+pub(super) fn run(args: &DemoArgs) -> Result<(SessionReport, Option<Failure>), Failure> {
     let (directory, key) = DemoDirectory::create()?;
     let mut workbench = Workbench::shipped()?;
     // A demonstration is nobody else's business.
@@ -71,44 +67,44 @@ pub(super) fn run(
     let mut setup = session_setup(&workbench, key, &overrides)?;
     // A scene that is refused gets its one sentence and nothing else, so other lines come after this.
     if !MonitorFeed::BUILT_IN {
-        terminal.say("this program was built without the monitor; the demo goes on without it");
+        taut_log::say("this program was built without the monitor; the demo goes on without it");
     }
     if let (true, DeviceSource::Remote { max_age, .. }) = (hold, &mut setup.device) {
         // Drawing shares the processor with the mouse; a pose that is late harms nobody who feels no force.
         *max_age = MOUSE_MAX_AGE;
     }
-    use_free_ports(&mut setup, args.port, terminal);
+    use_free_ports(&mut setup, args.port);
     let end = EndFlag::listen().map_err(Failure::failed)?;
     let mut session = Session::start(setup)?;
     session.end_with(&end);
-    announce(&session, terminal);
+    announce(&session);
     if let Some(directory) = &args.recording {
-        terminal.say(&recording_size::sentence(directory));
+        taut_log::say(&recording_size::sentence(directory));
     }
     let pushes = |input: &taut_bridge::InputChoice| input.force_device().is_some();
     if overrides.input.as_ref().is_some_and(pushes) {
         // Somebody holds it: a person arms.
         taut_bridge::listen_at_console(session.arm_switch());
-        terminal.say(HELP_ARM);
+        taut_log::say(HELP_ARM);
     }
 
     let launcher = Launcher::new(&session, &directory, args)?;
     let mut children = Vec::new();
     if args.bridge {
-        children.push(launcher.bridge(device, hand_path.as_ref(), terminal)?);
+        children.push(launcher.bridge(device, hand_path.as_ref())?);
     }
-    start_render_nodes(&launcher, &workbench, hold, terminal, &mut children)?;
+    start_render_nodes(&launcher, &workbench, hold, &mut children)?;
 
-    let early = watch_all(&mut session, &mut children, args.duration, terminal);
-    terminal.end_status();
+    let early = watch_all(&mut session, &mut children, args.duration);
+    taut_log::end_status();
     // One that is still joining would complain.
     children.iter().for_each(NamedChild::mute);
-    let (report, failure) = session.stop(terminal);
+    let (report, failure) = session.stop();
     let early = (!early.is_empty()).then(|| Failure::Failed(early.join(", ")));
     end.let_signals_kill();
     children.iter_mut().for_each(NamedChild::interrupt);
     for name in wait_or_kill(children, GRACE) {
-        terminal.say(&format!(
+        taut_log::say(&format!(
             "taut: {name} did not end by itself and was killed"
         ));
     }
@@ -160,18 +156,17 @@ fn start_render_nodes(
     launcher: &Launcher<'_>,
     workbench: &Workbench,
     hold: bool,
-    terminal: &Terminal,
     children: &mut Vec<NamedChild>,
 ) -> Result<(), Failure> {
     if !render::BUILT_IN {
-        terminal.say("this program was built without drawing; the demo goes on without it");
+        taut_log::say("this program was built without drawing; the demo goes on without it");
         return Ok(());
     }
     for (place, node) in workbench.nodes.iter().enumerate() {
-        children.push(launcher.render_node(&node.name, hold && place == 0, terminal)?);
+        children.push(launcher.render_node(&node.name, hold && place == 0)?);
     }
     if hold {
-        terminal.say(HELP_MOUSE);
+        taut_log::say(HELP_MOUSE);
     }
     Ok(())
 }
@@ -181,16 +176,15 @@ fn watch_all(
     session: &mut Session,
     children: &mut [NamedChild],
     duration: Option<f64>,
-    terminal: &Terminal,
 ) -> Vec<String> {
     let mut early = Vec::new();
-    watch(session, duration, terminal, |_| {
+    watch(session, duration, |_| {
         for child in &mut *children {
             if let Some(status) = child.newly_ended()
                 && !status.success()
             {
                 let what = format!("{} ended early ({status})", child.name());
-                terminal.say(&format!("taut: {what}; the demo goes on without it"));
+                taut_log::say(&format!("taut: {what}; the demo goes on without it"));
                 early.push(what);
             }
         }
@@ -232,6 +226,7 @@ struct Launcher<'a> {
     directory: &'a DemoDirectory,
     args: &'a DemoArgs,
     headless: bool,
+    said: Said,
 }
 
 impl<'a> Launcher<'a> {
@@ -254,6 +249,7 @@ impl<'a> Launcher<'a> {
             directory,
             args,
             headless: !has_windows(args),
+            said: Said::default(),
         })
     }
 
@@ -267,12 +263,7 @@ impl<'a> Launcher<'a> {
         command
     }
 
-    fn render_node(
-        &self,
-        node: &str,
-        hold: bool,
-        terminal: &Terminal,
-    ) -> Result<NamedChild, Failure> {
+    fn render_node(&self, node: &str, hold: bool) -> Result<NamedChild, Failure> {
         let mut command = self.role("render", node);
         if self.args.device.as_deref() == Some("mouse") {
             // Who looks at a desk's screen has no glasses on, and sees the force that nobody feels.
@@ -298,15 +289,10 @@ impl<'a> Launcher<'a> {
         if let Some(out) = &self.args.out {
             command.arg("--out").arg(out);
         }
-        start(node, command, terminal)
+        self.start(node, command)
     }
 
-    fn bridge(
-        &self,
-        device: &str,
-        hand: Option<&HandPath>,
-        terminal: &Terminal,
-    ) -> Result<NamedChild, Failure> {
+    fn bridge(&self, device: &str, hand: Option<&HandPath>) -> Result<NamedChild, Failure> {
         let mut command = self.role("bridge", BRIDGE_NODE);
         command.args(["--device", device]);
         if std::env::var_os(LOG_VARIABLE).is_none() {
@@ -322,7 +308,15 @@ impl<'a> Launcher<'a> {
                 command.arg("--loop");
             }
         }
-        start(BRIDGE_NODE, command, terminal)
+        self.start(BRIDGE_NODE, command)
+    }
+
+    fn start(&self, name: &str, command: Command) -> Result<NamedChild, Failure> {
+        NamedChild::start(name, command, &self.said).map_err(|error| {
+            Failure::failed(format!(
+                "{name} cannot be started ({error}); check the limit on processes (ulimit -u)"
+            ))
+        })
     }
 }
 
@@ -332,12 +326,4 @@ fn has_windows(args: &DemoArgs) -> bool {
         .iter()
         .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
     has_display && !args.headless && args.out.is_none()
-}
-
-fn start(name: &str, command: Command, terminal: &Terminal) -> Result<NamedChild, Failure> {
-    NamedChild::start(name, command, terminal).map_err(|error| {
-        Failure::failed(format!(
-            "{name} cannot be started ({error}); check the limit on processes (ulimit -u)"
-        ))
-    })
 }

@@ -2,14 +2,13 @@
 
 use std::net::{TcpListener, UdpSocket};
 
-use crate::report::terminal::Terminal;
 use crate::session::setup::SessionSetup;
 
-pub(super) fn use_free_ports(setup: &mut SessionSetup, first: Option<u16>, terminal: &Terminal) {
+pub(super) fn use_free_ports(setup: &mut SessionSetup, first: Option<u16>) {
     if let Some(first) = first {
         use_ports(setup, first);
     }
-    take_free_ports(setup, terminal);
+    take_free_ports(setup);
 }
 
 /// Puts the demo on four ports from `first` on, or on free ones where that is 0.
@@ -29,10 +28,10 @@ fn use_ports(setup: &mut SessionSetup, first: u16) {
 }
 
 /// Replaces every port that somebody else has by a free one, and says so.
-fn take_free_ports(setup: &mut SessionSetup, terminal: &Terminal) {
+fn take_free_ports(setup: &mut SessionSetup) {
     let make_usable = |port: &mut u16, is_free: bool, what: &str| {
         if !is_free {
-            terminal.say(&format!("port {port} is in use; {what} takes a free one"));
+            taut_log::say(&format!("port {port} is in use; {what} takes a free one"));
             *port = 0;
         }
     };

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use taut_scene::{NeededFile, Workbench};
 
 use super::load::Next;
-use crate::report::terminal::Terminal;
 use crate::session::file_watch::FileWatch;
 use crate::shared::failure::Failure;
 
@@ -62,7 +61,7 @@ impl SceneWatch {
     }
 
     /// The session that is to take the place of this one, if what was read is another scene and can be served; says what became of a change.
-    pub(super) fn take(&self, terminal: &Terminal, read: Result<Next, Failure>) -> Option<Next> {
+    pub(super) fn take(&self, read: Result<Next, Failure>) -> Option<Next> {
         match read {
             // The workbench file may have changed in what is followed without a new session, or needs a restart. What was read counts: what was written
             // since then is due by itself.
@@ -72,14 +71,14 @@ impl SceneWatch {
                 None
             }
             Ok(next) => {
-                terminal.say(&format!(
+                taut_log::say(&format!(
                     "the scene {} is taken: the force fades, and another session begins",
                     next.workbench.scene
                 ));
                 Some(next)
             }
             Err(error) => {
-                terminal.say(&format!(
+                taut_log::say(&format!(
                     "the changed scene is not taken, and the one before goes on: {error}"
                 ));
                 None
@@ -129,7 +128,7 @@ mod tests {
         }
         let next = loader.load();
         then();
-        watch.take(&Terminal::standard_error(), next)
+        watch.take(next)
     }
 
     /// `taut serve --follow-scene` of a workbench file in `place`, and of this scene there.
@@ -201,7 +200,7 @@ mod tests {
         std::fs::write(&scene, edited).expect("written");
         let next = loop {
             let is_read_already = live.pending.is_some();
-            let next = live.follow(Duration::ZERO, &Terminal::standard_error());
+            let next = live.follow(Duration::ZERO);
             if let Some(next) = next {
                 assert!(is_read_already, "it was read while the session waited");
                 break next;

@@ -25,7 +25,6 @@ pub(super) use self::load::{Next, load_workbench, refuse_to_follow};
 use self::pending::{Pending, joined};
 use self::running::{NO_FILE, Running};
 use crate::cli::ServeArgs;
-use crate::report::terminal::Terminal;
 use crate::session::Session;
 use crate::session::audit::PageAudit;
 use crate::session::operator::{AskedScene, SceneDesk};
@@ -130,18 +129,18 @@ impl LiveScene {
     }
 
     /// What is to take the place of this session, whose loops have run for `age`, if something is.
-    pub(super) fn follow(&mut self, age: Duration, terminal: &Terminal) -> Option<Next> {
+    pub(super) fn follow(&mut self, age: Duration) -> Option<Next> {
         match self.pending.take() {
             Some(pending) if !pending.is_finished() => {
                 self.pending = Some(pending);
                 return None;
             }
-            Some(Pending::Wish(asked, thread)) => return self.conclude(asked, thread, terminal),
-            Some(Pending::Files(thread)) => return self.take_files(thread, terminal),
+            Some(Pending::Wish(asked, thread)) => return self.conclude(asked, thread),
+            Some(Pending::Files(thread)) => return self.take_files(thread),
             None => {}
         }
         if self.files.as_mut().is_some_and(SceneWatch::is_due) {
-            self.read_files(terminal);
+            self.read_files();
         } else if age >= SHORTEST_LIFE
             && let Some(asked) = self.desk.take()
         {
@@ -151,33 +150,29 @@ impl LiveScene {
     }
 
     /// Begins to read the files, which are others now.
-    fn read_files(&mut self, terminal: &Terminal) {
+    fn read_files(&mut self) {
         match pending::load(self.loader.clone()) {
             Ok(thread) => self.pending = Some(Pending::Files(thread)),
-            Err(error) => terminal.say(&format!(
+            Err(error) => taut_log::say(&format!(
                 "the changed scene is not taken: no thread reads it ({error})"
             )),
         }
     }
 
     /// Takes what the files are now.
-    fn take_files(
-        &mut self,
-        thread: JoinHandle<Result<Next, Failure>>,
-        terminal: &Terminal,
-    ) -> Option<Next> {
+    fn take_files(&mut self, thread: JoinHandle<Result<Next, Failure>>) -> Option<Next> {
         let (files, running) = (self.files.as_ref()?, self.running.as_ref()?);
-        let mut next = files.take(terminal, joined(thread))?;
+        let mut next = files.take(joined(thread))?;
         next.goes_on = next.workbench.scene == running.from;
         if let Some(recording) = running.recording.as_ref() {
-            terminal.say(&format!(
+            taut_log::say(&format!(
                 "the recording to {} ends with the scene that it is of; begin another from the operator's page",
                 recording.display()
             ));
         }
         self.gone.clone_from(&running.not_kept);
         if !self.gone.is_empty() {
-            terminal.say(&format!(
+            taut_log::say(&format!(
                 "what was changed while it ran, and not kept in a file, is gone: {}",
                 self.gone.join("; ")
             ));
@@ -250,7 +245,6 @@ impl LiveScene {
         &mut self,
         asked: AskedScene,
         thread: JoinHandle<Result<Option<Change>, Failure>>,
-        terminal: &Terminal,
     ) -> Option<Next> {
         let Some(made) = joined(thread).transpose() else {
             let kept = self.keep_as_it_runs(&asked);
@@ -271,7 +265,7 @@ impl LiveScene {
                 } else {
                     "changes the scene"
                 };
-                terminal.say(&format!(
+                taut_log::say(&format!(
                     "an operator {does} ({what}): the force fades, and another session begins"
                 ));
                 if keeps {

@@ -23,7 +23,6 @@ use taut_scene::{
 use crate::cli::{MethodChoice, ReplayArgs};
 use crate::loops::fidelity::FidelityWatch;
 use crate::loops::realtime::thread_cpu_time;
-use crate::report::terminal::Terminal;
 use crate::report::{ReplayReport, WorkReport};
 use crate::shared::failure::Failure;
 use crate::shared::shutdown::Shutdown;
@@ -64,8 +63,7 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
         if let Some(rate) = args.god_object_rate {
             plan.use_update_rate(rate, "--god-object-rate");
         }
-        let terminal = Terminal::standard_error();
-        plan.lines().iter().for_each(|line| terminal.say(line));
+        plan.lines().iter().for_each(|line| taut_log::say(line));
         replay = replay.with_fidelity(plan);
     }
 

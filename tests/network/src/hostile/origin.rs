@@ -6,7 +6,6 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut::shared::failure::Failure;
@@ -174,8 +173,8 @@ fn run(coupling: CouplingChoice, treatment: Treatment) -> Result<BridgeReport, B
     args.priority = 0;
     let report = taut_bridge::run(&args).map_err(missing);
     drop(relay);
-    session.follow_network(&Terminal::standard_error());
-    let (_, failure) = session.stop(&Terminal::standard_error());
+    session.follow_network();
+    let (_, failure) = session.stop();
     match failure {
         Some(failure) => Err(failed(failure)),
         None => report,
