@@ -10,12 +10,12 @@ use taut::commands::replay::Replay;
 use taut::loops::checker::PenetrationChecker;
 use taut::loops::wiring::WiredLoops;
 use taut::session::broadcast::StateWriter;
-use taut::session::head::{HeadMotion, HeadSource};
+use taut::session::head::heads;
 use taut_bridge::{
     AtEnd, Device, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceSample, ViaPoint,
 };
 use taut_proto::PoseF32;
-use taut_scene::{BuiltMotion, BuiltScene, Scene};
+use taut_scene::{BuiltMotion, BuiltScene, HeadTracking, Scene, Viewer, Workbench};
 
 /// Index of the plate among the scene's obstacles: the wall comes first.
 const PLATE: usize = 1;
@@ -158,14 +158,12 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
     let scene = scene();
     let motion = motion(&scene);
     let session = session_of(&scene, yielding_hand(&scene));
-    let source = HeadSource {
-        rest: Pose::identity(),
-        eye_separation: 0.064,
-        motion: HeadMotion::Still,
+    let workbench = Workbench::shipped().unwrap_or_else(|error| panic!("{error}"));
+    let viewer = Viewer {
+        tracking: HeadTracking::Fixed,
+        ..workbench.viewer
     };
-    let [head] = source
-        .start(None)
-        .expect("a still head has nothing to start");
+    let [head] = heads(&viewer, None).expect("a still head has nothing to start");
     let WiredLoops {
         mut god_object,
         mut coupling,

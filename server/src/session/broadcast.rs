@@ -314,7 +314,7 @@ impl MotionEstimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::head::{HeadMotion, HeadSource};
+    use crate::session::head::heads;
     use crate::session::state_events::BUTTON_SHIFT;
     use crate::shared::device_state::SafetyState;
     use crate::shared::fanout::Publisher;
@@ -322,6 +322,7 @@ mod tests {
     use god_object::constraint::{Feature, FeaturePair};
     use taut_bridge::{EventKind, SafetyEvent};
     use taut_proto::state::event_code;
+    use taut_scene::{HeadTracking, Viewer, Workbench};
 
     fn constraint(obstacle: u16, gap: f64) -> NonPenetrationConstraint {
         NonPenetrationConstraint {
@@ -366,12 +367,12 @@ mod tests {
         let (states, [device]) = device_state::channel(start);
         let (contacts, [snapshots]) = contact_snapshot::channel(start, 32);
         let (wrenches, [wrench]) = wrench_command::channel();
-        let source = HeadSource {
-            rest: Pose::translation(0.0, -1.0, 1.0),
-            eye_separation: 0.064,
-            motion: HeadMotion::Still,
+        let workbench = Workbench::shipped().unwrap_or_else(|error| panic!("{error}"));
+        let viewer = Viewer {
+            tracking: HeadTracking::Fixed,
+            ..workbench.viewer
         };
-        let [head] = source.start(None).expect("nothing to start");
+        let [head] = heads(&viewer, None).expect("nothing to start");
         let shared = SharedView {
             device,
             contacts: snapshots,

@@ -7,13 +7,14 @@ use taut_bridge::edge::offer_of;
 use taut_bridge::{ArmSwitch, ArmWish, Device, ExternalWrench, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{Content, JoinPolicy, ServerLink, ServerOptions};
+use taut_scene::Viewer;
 use tokio::runtime::Runtime;
 
 use crate::loops::realtime::{RealtimeLedger, Scheduling};
 use crate::loops::statistics::Statistics;
 use crate::session::broadcast::BridgeCommands;
 use crate::session::edge_sets::EdgeSets;
-use crate::session::head::{Head, HeadSource};
+use crate::session::head::{Head, heads};
 use crate::session::observers::{ObserverServices, ObserverSettings, Outlets};
 use crate::session::operator::{Continuity, Facts, OperatorPage, OperatorSetup};
 use crate::session::setup::{DeviceSource, ExternalSetup, LinkSettings, SessionSetup, unencodable};
@@ -35,7 +36,7 @@ pub(super) struct ConnectionSettings<'a> {
     pub(super) observers: &'a ObserverSettings,
     pub(super) device: DeviceSource,
     pub(super) external: Option<ExternalSetup>,
-    pub(super) head: HeadSource,
+    pub(super) viewer: &'a Viewer,
     pub(super) settings: &'a Settings,
 }
 
@@ -75,7 +76,7 @@ impl Connections {
         let zenoh = &wanted.observers.zenoh;
         let external = external::connect(wanted.external, &link, zenoh, clock)?;
         let device_side = DeviceSide::connect(wanted.device, external, &link, wanted.settings)?;
-        let heads = wanted.head.start(link.head_inputs()).map_err(|error| {
+        let heads = heads(wanted.viewer, link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
         let connections = Self {

@@ -15,8 +15,9 @@ use std::time::Duration;
 
 use god_object::nalgebra::Vector3;
 use god_object::spatial::Pose;
-use taut_bridge::{TrackerFeed, TrackerState, VrpnSettings, VrpnSource};
+use taut_bridge::{TrackerFeed, TrackerState, VrpnSettings, vrpn_settings};
 use taut_link::HeadOutput;
+use taut_scene::{HeadTracking, Viewer};
 use taut_vrpn::SensorMapping;
 
 use crate::session::remote_head::RemoteHead;
@@ -26,48 +27,6 @@ const FORE_AFT_PERIODS: f64 = 1.618;
 /// Sway fore and aft is this share of that from side to side.
 const FORE_AFT_SHARE: f64 = 0.5;
 
-/// What moves the viewer's head, before anything is started.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeadSource {
-    /// The head at rest, workbench frame: between the eyes, x to the right ear, y up, -z ahead.
-    pub rest: Pose,
-    /// Distance between the pupils, m.
-    pub eye_separation: f64,
-    /// How it moves.
-    pub motion: HeadMotion,
-}
-
-/// How a head moves.
-#[derive(Clone, Debug, PartialEq)]
-pub enum HeadMotion {
-    /// Not at all.
-    Still,
-    /// Simulated.
-    Sway(Sway),
-    /// Tracked.
-    Tracker(Box<TrackerSource>),
-    /// Tracked by a client of the role tracker.
-    Remote,
-}
-
-/// Simulated movement of a head.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sway {
-    /// Largest displacement to either side, m.
-    pub amplitude: f64,
-    /// Time of one sway, s.
-    pub period: f64,
-}
-
-/// A sensor on the viewer's head.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrackerSource {
-    /// Which.
-    pub source: VrpnSource,
-    /// From its reports to the head in the workbench frame.
-    pub mapping: SensorMapping,
-}
-
 /// One reader's view of where the viewer's head is.
 #[derive(Debug)]
 pub struct Head {
@@ -76,6 +35,15 @@ pub struct Head {
     /// Distance between the pupils, m.
     pub eye_separation: f64,
     motion: Motion,
+}
+
+/// Simulated movement of a head.
+#[derive(Clone, Copy, Debug)]
+struct Sway {
+    /// Largest displacement to either side, m.
+    amplitude: f64,
+    /// Time of one sway, s.
+    period: f64,
 }
 
 #[derive(Debug)]
@@ -104,45 +72,46 @@ struct Seen {
     came: Option<Duration>,
 }
 
-impl HeadSource {
-    /// Starts to listen to the tracker, if there is one: a head for each reader. `remote` are the link's ends for a tracker on the network;
-    /// without them such a head stays at rest.
-    ///
-    /// # Errors
-    /// No thread or no socket can be had. A tracker that is not there yet is waited for.
-    pub fn start<const READERS: usize>(
-        self,
-        remote: Option<[HeadOutput; READERS]>,
-    ) -> std::io::Result<[Head; READERS]> {
-        let Self {
-            rest,
-            eye_separation,
-            motion,
-        } = self;
-        let head = |motion| Head {
-            rest,
-            eye_separation,
-            motion,
-        };
-        Ok(match motion {
-            HeadMotion::Still => std::array::from_fn(|_| head(Motion::Still)),
-            HeadMotion::Sway(sway) => std::array::from_fn(|_| head(Motion::Sway(sway))),
-            HeadMotion::Remote => match remote {
-                Some(outputs) => outputs
-                    .map(|output| head(Motion::Remote(Box::new(RemoteHead::new(output, rest))))),
-                None => std::array::from_fn(|_| head(Motion::Still)),
-            },
-            HeadMotion::Tracker(tracker) => {
-                let TrackerSource { source, mapping } = *tracker;
-                TrackerFeed::start_for::<READERS>(source)?.map(|feed| {
-                    head(Motion::Tracker(Box::new(Tracked {
-                        feed,
-                        seen: Seen::new(mapping, rest),
-                    })))
-                })
+/// Starts to listen to the viewer's tracker, if there is one: a head for each reader. `remote` are the link's ends for a tracker on the network;
+/// without them such a head stays at rest.
+///
+/// # Errors
+/// No thread or no socket can be had. A tracker that is not there yet is waited for.
+pub fn heads<const READERS: usize>(
+    viewer: &Viewer,
+    remote: Option<[HeadOutput; READERS]>,
+) -> std::io::Result<[Head; READERS]> {
+    let rest = viewer.head;
+    let head = |motion| Head {
+        rest,
+        eye_separation: viewer.eye_separation,
+        motion,
+    };
+    let still = || std::array::from_fn(|_| head(Motion::Still));
+    Ok(match &viewer.tracking {
+        HeadTracking::Fixed => still(),
+        &HeadTracking::Sway { amplitude, period } => {
+            let sway = Sway { amplitude, period };
+            std::array::from_fn(|_| head(Motion::Sway(sway)))
+        }
+        HeadTracking::Remote => match remote {
+            Some(outputs) => {
+                outputs.map(|output| head(Motion::Remote(Box::new(RemoteHead::new(output, rest)))))
             }
-        })
-    }
+            None => still(),
+        },
+        HeadTracking::Vrpn(chosen) => match vrpn_settings(chosen) {
+            Some(VrpnSettings {
+                source, mapping, ..
+            }) => TrackerFeed::start_for::<READERS>(source)?.map(|feed| {
+                head(Motion::Tracker(Box::new(Tracked {
+                    feed,
+                    seen: Seen::new(mapping, rest),
+                })))
+            }),
+            None => still(), // the file's reader demands an address
+        },
+    })
 }
 
 impl Head {
@@ -216,14 +185,19 @@ impl Sway {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use taut_scene::Workbench;
 
-    fn head(rest: Pose, motion: HeadMotion) -> Head {
-        let source = HeadSource {
-            rest,
-            eye_separation: 0.064,
-            motion,
-        };
-        let [head] = source.start(None).expect("nothing to start");
+    fn viewer(head: Pose, tracking: HeadTracking) -> Viewer {
+        let shipped = Workbench::shipped().unwrap_or_else(|error| panic!("{error}"));
+        Viewer {
+            head,
+            tracking,
+            ..shipped.viewer
+        }
+    }
+
+    fn head(rest: Pose, tracking: HeadTracking) -> Head {
+        let [head] = heads(&viewer(rest, tracking), None).expect("nothing to start");
         head
     }
 
@@ -232,10 +206,10 @@ mod tests {
         let rest = Pose::new(Vector3::new(0.0, -0.6, 0.7), Vector3::x() * 0.8);
         let mut head = head(
             rest,
-            HeadMotion::Sway(Sway {
+            HeadTracking::Sway {
                 amplitude: 0.05,
                 period: 6.0,
-            }),
+            },
         );
         assert_eq!(head.pose(Duration::ZERO), rest);
         let mut farthest: f64 = 0.0;
@@ -252,7 +226,7 @@ mod tests {
 
     #[test]
     fn a_still_head_stays() {
-        let mut head = head(Pose::identity(), HeadMotion::Still);
+        let mut head = head(Pose::identity(), HeadTracking::Fixed);
         assert_eq!(head.pose(Duration::from_secs(3)), Pose::identity());
         assert!(!head.moves());
     }
@@ -287,19 +261,9 @@ mod tests {
     #[test]
     fn a_head_whose_tracker_is_not_there_is_at_rest() {
         let rest = Pose::translation(0.0, -1.0, 1.2);
-        let source = HeadSource {
-            rest,
-            eye_separation: 0.064,
-            motion: HeadMotion::Tracker(Box::new(TrackerSource {
-                source: VrpnSource {
-                    address: "Head@127.0.0.1:1".parse().expect("valid"),
-                    sensor: 0,
-                    mode: taut_bridge::VrpnMode::Tcp,
-                },
-                mapping: SensorMapping::identity(),
-            })),
-        };
-        let mut heads = source.start::<2>(None).expect("a thread");
+        let chosen = taut_kinds::read_choice("vrpn:Head@127.0.0.1:1").expect("valid");
+        let viewer = viewer(rest, HeadTracking::Vrpn(Box::new(chosen)));
+        let mut heads = heads::<2>(&viewer, None).expect("a thread");
         for head in &mut heads {
             assert!(head.moves());
             assert_eq!(head.pose(Duration::from_secs(1)), rest);

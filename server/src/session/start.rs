@@ -71,7 +71,7 @@ impl Session {
             observers: &setup.observers,
             device: setup.device,
             external: setup.external,
-            head: setup.head,
+            viewer: &setup.viewer,
             settings: &setup.settings,
         };
         let (mut connections, device_side) = Connections::open(wanted, clock, &ledger)?;
@@ -322,7 +322,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
             .to_isometry()
             .unwrap_or_else(Pose::identity),
         display_scale: description.display_scale,
-        head: setup.head.rest,
+        head: setup.viewer.head,
         rest_distance: setup.settings.rest_distance,
         colours: own_colours(description),
     }

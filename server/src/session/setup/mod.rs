@@ -22,12 +22,13 @@ use taut_bridge::{
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
-use taut_scene::{BuiltHand, BuiltMotion, Carried, FidelityPlan, Prepared, Scene, WrenchSource};
+use taut_scene::{
+    BuiltHand, BuiltMotion, Carried, FidelityPlan, Prepared, Scene, Viewer, WrenchSource,
+};
 
 use crate::loops::checker::PenetrationChecker;
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
-use crate::session::head::HeadSource;
 use crate::session::monitor::MonitorSettings;
 use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
@@ -62,7 +63,7 @@ pub struct SessionSetup {
     /// A force from outside, where the workbench takes one.
     pub external: Option<ExternalSetup>,
     /// The viewer.
-    pub head: HeadSource,
+    pub viewer: Viewer,
     /// What clients fetch at join.
     pub content: Content,
     /// Addresses, key and limits of the network.

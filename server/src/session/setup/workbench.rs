@@ -8,19 +8,17 @@ use std::time::Duration;
 use god_object::Pose;
 use taut_bridge::{
     ContactBound, DeviceChoice, ExternalWrenchSettings, InputChoice, MAX_EDGE_DELAY, Passivity,
-    PassivitySettings, Rearm, SafetySettings, ValidationSettings, WrenchAxes, vrpn_settings,
+    PassivitySettings, Rearm, SafetySettings, ValidationSettings, WrenchAxes,
 };
 use taut_link::{AlsoKey, ClusterKey, MulticastOptions, read_key_file};
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
 use taut_scene::{
-    BuiltScene, Device, HeadTracking, Prepared, RealTimeMode, Scene, TransportKind, Viewer,
-    Workbench, WrenchFrame,
+    BuiltScene, Device, Prepared, RealTimeMode, Scene, TransportKind, Workbench, WrenchFrame,
 };
 
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
 use crate::session::frames;
-use crate::session::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
@@ -137,7 +135,7 @@ pub fn session_setup(
         world,
         safety,
         external: external(workbench, overrides, &workbench_from_scene)?,
-        head: head(&workbench.viewer),
+        viewer: workbench.viewer.clone(),
         content,
         link,
         observers: ObserverSettings::of(workbench)?,
@@ -267,28 +265,6 @@ fn recording(directory: PathBuf, scene: &Scene, built: &BuiltScene) -> Recording
             records: None,
         },
         scene: source.text,
-    }
-}
-
-fn head(viewer: &Viewer) -> HeadSource {
-    HeadSource {
-        rest: viewer.head,
-        eye_separation: viewer.eye_separation,
-        motion: match &viewer.tracking {
-            HeadTracking::Fixed => HeadMotion::Still,
-            HeadTracking::Sway { amplitude, period } => HeadMotion::Sway(Sway {
-                amplitude: *amplitude,
-                period: *period,
-            }),
-            HeadTracking::Remote => HeadMotion::Remote,
-            HeadTracking::Vrpn(chosen) => match vrpn_settings(chosen) {
-                Some(settings) => HeadMotion::Tracker(Box::new(TrackerSource {
-                    source: settings.source,
-                    mapping: settings.mapping,
-                })),
-                None => HeadMotion::Still, // the file's reader demands an address
-            },
-        },
     }
 }
 
