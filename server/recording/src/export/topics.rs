@@ -29,9 +29,15 @@ struct Topic {
     messages: u32,
 }
 
-/// The file that grows.
-pub(super) struct Topics<'a, W: Write> {
+/// The file that grows, and room for a message on its way there.
+struct Output<W: Write> {
     writer: Writer<NoSeek<W>>,
+    bytes: Vec<u8>,
+}
+
+/// What is written into it.
+pub(super) struct Topics<'a, W: Write> {
+    out: Output<W>,
     scene: Option<&'a SceneFrames>,
     device_pose: Topic,
     device_twist: Topic,
@@ -45,40 +51,41 @@ pub(super) struct Topics<'a, W: Write> {
     buttons: Option<u16>,
     /// When the device was where it was told to be last.
     newest_sample: Option<Duration>,
-    bytes: Vec<u8>,
 }
 
 impl<'a, W: Write> Topics<'a, W> {
     pub(super) fn create(out: W, scene: Option<&'a SceneFrames>) -> McapResult<Self> {
-        let mut writer = WriteOptions::new()
+        let writer = WriteOptions::new()
             .profile("ros2")
             .library(concat!("taut ", env!("CARGO_PKG_VERSION")))
             .compression(None)
             .disable_seeking(true)
             .create(NoSeek::new(out))?;
-        let w = &mut writer;
+        let mut out = Output {
+            writer,
+            bytes: Vec::new(),
+        };
         let obstacles = scene.map_or(&[][..], |scene| &scene.obstacles);
         Ok(Self {
-            device_pose: topic::<PoseStamped<'_>, W>(w, "/device/pose")?,
-            device_twist: topic::<TwistStamped<'_>, W>(w, "/device/twist")?,
-            device_buttons: topic::<Joy<'_>, W>(w, "/device/buttons")?,
-            hand_wrench: topic::<WrenchStamped<'_>, W>(w, "/hand/wrench")?,
-            god_object_pose: topic::<PoseStamped<'_>, W>(w, "/god_object/pose")?,
-            coupling_wrench: topic::<WrenchStamped<'_>, W>(w, "/coupling/wrench")?,
-            transforms: topic::<TfMessage<'_>, W>(w, "/tf")?,
+            device_pose: out.topic::<PoseStamped<'_>>("/device/pose")?,
+            device_twist: out.topic::<TwistStamped<'_>>("/device/twist")?,
+            device_buttons: out.topic::<Joy<'_>>("/device/buttons")?,
+            hand_wrench: out.topic::<WrenchStamped<'_>>("/hand/wrench")?,
+            god_object_pose: out.topic::<PoseStamped<'_>>("/god_object/pose")?,
+            coupling_wrench: out.topic::<WrenchStamped<'_>>("/coupling/wrench")?,
+            transforms: out.topic::<TfMessage<'_>>("/tf")?,
             obstacles: obstacles
                 .iter()
                 .map(|obstacle| {
                     let frame = obstacle_frame(obstacle.index, &obstacle.name);
-                    let topic = topic::<PoseStamped<'_>, W>(w, &format!("/{frame}/pose"))?;
+                    let topic = out.topic::<PoseStamped<'_>>(&format!("/{frame}/pose"))?;
                     Ok((frame, topic))
                 })
                 .collect::<McapResult<_>>()?,
-            writer,
+            out,
             scene,
             buttons: None,
             newest_sample: None,
-            bytes: Vec::new(),
         })
     }
 
@@ -89,59 +96,29 @@ impl<'a, W: Write> Topics<'a, W> {
             return Ok(()); // its reader leaves out such times
         };
         let wrench = WrenchStamped::new(at, &record.wrench);
-        put(
-            &mut self.writer,
-            &mut self.hand_wrench,
-            &mut self.bytes,
-            record.tick,
-            &wrench,
-        )?;
+        self.out.put(&mut self.hand_wrench, record.tick, &wrench)?;
         if record.faulty {
             return Ok(()); // the pose is that of the tick before
         }
         if self.buttons.replace(record.buttons) != Some(record.buttons) {
             let joy = Joy::new(sampled.in_frame(DEVICE), record.buttons);
-            put(
-                &mut self.writer,
-                &mut self.device_buttons,
-                &mut self.bytes,
-                record.tick,
-                &joy,
-            )?;
+            self.out.put(&mut self.device_buttons, record.tick, &joy)?;
         }
         if self.newest_sample.replace(record.time) == Some(record.time) {
             return Ok(()); // the last sample, read again: readers of transforms complain of a time that comes twice
         }
         let world = sampled.in_frame(WORLD);
         let pose = PoseStamped::new(world, &record.pose);
-        put(
-            &mut self.writer,
-            &mut self.device_pose,
-            &mut self.bytes,
-            record.tick,
-            &pose,
-        )?;
+        self.out.put(&mut self.device_pose, record.tick, &pose)?;
         let twist = TwistStamped::new(sampled, &record.velocity);
-        put(
-            &mut self.writer,
-            &mut self.device_twist,
-            &mut self.bytes,
-            record.tick,
-            &twist,
-        )?;
+        self.out.put(&mut self.device_twist, record.tick, &twist)?;
         let mut transforms = vec![TransformStamped::new(world, DEVICE, &record.pose)];
         if let Some(scene) = self.scene {
             let point = reference_frame(&record.pose, &scene.reference_point);
             transforms.push(TransformStamped::new(world, REFERENCE_POINT, &point));
         }
         let message = TfMessage { transforms };
-        put(
-            &mut self.writer,
-            &mut self.transforms,
-            &mut self.bytes,
-            record.tick,
-            &message,
-        )
+        self.out.put(&mut self.transforms, record.tick, &message)
     }
 
     /// Where the god-object came to, and where obstacles were sent, at the time at which that was published.
@@ -151,29 +128,17 @@ impl<'a, W: Write> Topics<'a, W> {
             return Ok(());
         };
         let pose = PoseStamped::new(world, &record.pose);
-        put(
-            &mut self.writer,
-            &mut self.god_object_pose,
-            &mut self.bytes,
-            time,
-            &pose,
-        )?;
+        self.out.put(&mut self.god_object_pose, time, &pose)?;
         let mut transforms = vec![TransformStamped::new(world, GOD_OBJECT, &record.pose)];
         let moving = self.scene.map_or(&[][..], |scene| &scene.obstacles);
         for (obstacle, (frame, topic)) in moving.iter().zip(&mut self.obstacles) {
             let pose = (obstacle.pose_at)(record.obstacle_time.as_secs_f64());
             let message = PoseStamped::new(world, &pose);
-            put(&mut self.writer, topic, &mut self.bytes, time, &message)?;
+            self.out.put(topic, time, &message)?;
             transforms.push(TransformStamped::new(world, frame, &pose));
         }
         let message = TfMessage { transforms };
-        put(
-            &mut self.writer,
-            &mut self.transforms,
-            &mut self.bytes,
-            time,
-            &message,
-        )
+        self.out.put(&mut self.transforms, time, &message)
     }
 
     /// What the coupling answered, before the safety stage.
@@ -182,13 +147,8 @@ impl<'a, W: Write> Topics<'a, W> {
             return Ok(());
         };
         let wrench = WrenchStamped::new(at, &record.wrench);
-        put(
-            &mut self.writer,
-            &mut self.coupling_wrench,
-            &mut self.bytes,
-            record.time,
-            &wrench,
-        )
+        self.out
+            .put(&mut self.coupling_wrench, record.time, &wrench)
     }
 
     /// How many messages there are.
@@ -211,42 +171,40 @@ impl<'a, W: Write> Topics<'a, W> {
 
     /// Says in the file what it is, and ends it.
     pub(super) fn finish(mut self, about: Metadata) -> McapResult<()> {
-        self.writer.write_metadata(&about)?;
-        self.writer.finish()?;
-        self.writer
-            .into_inner()
-            .into_inner()
-            .flush()
-            .map_err(McapError::Io)
+        let writer = &mut self.out.writer;
+        writer.write_metadata(&about)?;
+        writer.finish()?;
+        let mut file = self.out.writer.into_inner().into_inner();
+        file.flush().map_err(McapError::Io)
     }
 }
 
-fn topic<M: Message, W: Write>(writer: &mut Writer<NoSeek<W>>, name: &str) -> McapResult<Topic> {
-    let schema = writer.add_schema(M::NAME, "ros2msg", M::schema().as_bytes())?;
-    // MCAP's profile of ROS 2 requires the list; nobody offered these messages on a network, so it is empty.
-    let qos = ("offered_qos_profiles".to_owned(), "[]".to_owned());
-    let channel = writer.add_channel(schema, name, "cdr", &BTreeMap::from([qos]))?;
-    Ok(Topic {
-        channel,
-        messages: 0,
-    })
-}
+impl<W: Write> Output<W> {
+    fn topic<M: Message>(&mut self, name: &str) -> McapResult<Topic> {
+        let schema = self
+            .writer
+            .add_schema(M::NAME, "ros2msg", M::schema().as_bytes())?;
+        // MCAP's profile of ROS 2 requires the list; nobody offered these messages on a network, so it is empty.
+        let qos = ("offered_qos_profiles".to_owned(), "[]".to_owned());
+        let channel = self
+            .writer
+            .add_channel(schema, name, "cdr", &BTreeMap::from([qos]))?;
+        Ok(Topic {
+            channel,
+            messages: 0,
+        })
+    }
 
-fn put<W: Write, M: Message>(
-    writer: &mut Writer<NoSeek<W>>,
-    topic: &mut Topic,
-    bytes: &mut Vec<u8>,
-    time: Duration,
-    message: &M,
-) -> McapResult<()> {
-    message.encode(bytes)?;
-    let nanoseconds = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-    let header = MessageHeader {
-        channel_id: topic.channel,
-        sequence: topic.messages,
-        log_time: nanoseconds,
-        publish_time: nanoseconds,
-    };
-    topic.messages = topic.messages.wrapping_add(1);
-    writer.write_to_known_channel(&header, bytes)
+    fn put(&mut self, topic: &mut Topic, time: Duration, message: &impl Message) -> McapResult<()> {
+        message.encode(&mut self.bytes)?;
+        let nanoseconds = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        let header = MessageHeader {
+            channel_id: topic.channel,
+            sequence: topic.messages,
+            log_time: nanoseconds,
+            publish_time: nanoseconds,
+        };
+        topic.messages = topic.messages.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, &self.bytes)
+    }
 }
