@@ -39,6 +39,6 @@ pub use export::{ExportReport, MovingObstacle, SceneFrames, export_mcap};
 pub use identity::identity_of;
 pub use manifest::{FORMAT, Lost, Manifest, Records, SceneOrigin};
 pub use reader::{RecordReader, Recording};
-pub use recorder::{EventSender, Recorder, Summary};
+pub use recorder::{Recorder, Summary};
 pub use records::{ConstraintRecord, EventRecord, ForceRecord, HapticsRecord, UpdateRecord};
 pub use tap::{Tap, Taps};

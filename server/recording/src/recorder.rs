@@ -28,18 +28,6 @@ pub struct Recorder {
     thread: Option<JoinHandle<Summary>>,
 }
 
-/// Where the session says what happened. Not for the loops: sending allocates.
-#[derive(Clone, Debug)]
-pub struct EventSender(Sender<EventRecord>);
-
-impl EventSender {
-    /// Has the event written.
-    pub fn send(&self, event: EventRecord) {
-        // A recorder that is gone has nothing to write into.
-        let _ = self.0.send(event);
-    }
-}
-
 /// What came of a recording.
 #[derive(Debug, Default)]
 pub struct Summary {
@@ -94,10 +82,10 @@ impl Recorder {
         ))
     }
 
-    /// For those who have something to tell.
-    #[must_use]
-    pub fn events(&self) -> EventSender {
-        EventSender(self.events.clone())
+    /// Has the event written. Not for the loops: sending allocates.
+    pub fn tell(&self, event: EventRecord) {
+        // A thread that is gone has nothing to write into.
+        let _ = self.events.send(event);
     }
 
     /// Whether records are still written: not any more once a file has failed.

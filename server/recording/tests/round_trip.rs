@@ -128,7 +128,7 @@ fn record(path: &Path) {
         taps.haptics.push(tick(5, false));
         taps.haptics.push(tick(6, true));
     });
-    recorder.events().send(EventRecord {
+    recorder.tell(EventRecord {
         time: Duration::from_millis(3),
         kind: "client".to_owned(),
         text: "front joined, \"udp\"\nas third".to_owned(),

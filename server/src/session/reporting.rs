@@ -53,13 +53,7 @@ impl Session {
             if let Some(page) = &mut self.operator {
                 page.note_line(now, severity, &line);
             }
-            if let Some(recorder) = &self.recorder {
-                recorder.events().send(EventRecord {
-                    time: self.clock.now(),
-                    kind: "network".to_owned(),
-                    text: line.clone(),
-                });
-            }
+            self.record(self.clock.now(), "network", &line);
             if let Some(monitor) = &self.monitor {
                 monitor.log(severity, &line);
             }
@@ -101,13 +95,7 @@ impl Session {
             } else {
                 tracing::info!("{text}");
             }
-            if let Some(recorder) = &self.recorder {
-                recorder.events().send(EventRecord {
-                    time: event.time,
-                    kind: "safety".to_owned(),
-                    text,
-                });
-            }
+            self.record(event.time, "safety", &text);
         }
     }
 
@@ -127,11 +115,16 @@ impl Session {
         if let Some(page) = &mut self.operator {
             page.note_line(now, Severity::Error, &text);
         }
+        self.record(now, "method", &text);
+    }
+
+    /// Writes an event to the recording, if there is one.
+    fn record(&self, time: Duration, kind: &str, text: &str) {
         if let Some(recorder) = &self.recorder {
-            recorder.events().send(EventRecord {
-                time: now,
-                kind: "method".to_owned(),
-                text,
+            recorder.tell(EventRecord {
+                time,
+                kind: kind.to_owned(),
+                text: text.to_owned(),
             });
         }
     }

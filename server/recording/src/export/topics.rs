@@ -23,7 +23,6 @@ const GOD_OBJECT: &str = "god_object";
 const REFERENCE_POINT: &str = "reference_point";
 
 /// One topic.
-#[derive(Clone, Copy)]
 struct Topic {
     channel: u16,
     messages: u32,
@@ -33,6 +32,8 @@ struct Topic {
 struct Output<W: Write> {
     writer: Writer<NoSeek<W>>,
     bytes: Vec<u8>,
+    /// Of all topics.
+    messages: u64,
 }
 
 /// What is written into it.
@@ -64,6 +65,7 @@ impl<'a, W: Write> Topics<'a, W> {
         let mut out = Output {
             writer,
             bytes: Vec::new(),
+            messages: 0,
         };
         let obstacles = scene.map_or(&[][..], |scene| &scene.obstacles);
         Ok(Self {
@@ -153,20 +155,7 @@ impl<'a, W: Write> Topics<'a, W> {
 
     /// How many messages there are.
     pub(super) fn messages(&self) -> u64 {
-        let own = [
-            self.device_pose,
-            self.device_twist,
-            self.device_buttons,
-            self.hand_wrench,
-            self.god_object_pose,
-            self.coupling_wrench,
-            self.transforms,
-        ];
-        let obstacles = self.obstacles.iter().map(|(_, topic)| *topic);
-        own.into_iter()
-            .chain(obstacles)
-            .map(|topic| u64::from(topic.messages))
-            .sum()
+        self.out.messages
     }
 
     /// Says in the file what it is, and ends it.
@@ -205,6 +194,7 @@ impl<W: Write> Output<W> {
             publish_time: nanoseconds,
         };
         topic.messages = topic.messages.wrapping_add(1);
+        self.messages += 1;
         self.writer.write_to_known_channel(&header, &self.bytes)
     }
 }
