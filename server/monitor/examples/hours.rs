@@ -85,7 +85,6 @@ fn scene() -> MonitorScene {
     let body = |name: String, role| MonitorBody {
         name,
         vertices: vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
-        normals: None,
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
         colour: None,
         role,
@@ -122,7 +121,6 @@ fn sample(t: f64) -> MonitorSample {
         sample.contacts.push(ShownContact {
             point: Point3::new((f64::from(k) * t).sin(), f64::from(k), t.cos()),
             normal: Vector3::z(),
-            gap: 0.0,
         });
     }
     sample

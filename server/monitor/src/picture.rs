@@ -17,7 +17,7 @@ const CONTACT_RADIUS: f64 = 0.018;
 const NORMAL_LENGTH: f64 = 0.18;
 const NORMAL_RADIUS: f64 = 0.005;
 const FORCE_RADIUS: f64 = 0.012;
-/// A force of this many newtons is drawn as long as the god-object's diagonal, unless the scene says otherwise.
+/// A force of this many newtons is drawn as long as the god-object's diagonal.
 const NEWTONS_PER_DIAGONAL: f64 = 8.0;
 /// Forces below this are not drawn, N: the arrow would be shorter than it is thick.
 const LEAST_DRAWN_FORCE: f64 = 0.01;
@@ -46,18 +46,12 @@ pub(crate) fn check_mesh(body: &MonitorBody) -> Result<(), MonitorError> {
         .iter()
         .flatten()
         .all(|&index| (index as usize) < count);
-    let normals_fit = body
-        .normals
-        .as_ref()
-        .is_none_or(|normals| normals.len() == count);
     let reason = if body.triangles.is_empty() {
         "it has no triangles".to_owned()
     } else if !finite || !is_finite(&body.pose) {
         "a vertex or its pose is not a finite number".to_owned()
     } else if !in_range {
         format!("a triangle names a vertex beyond the last of {count}")
-    } else if !normals_fit {
-        format!("it needs {count} normals, one per vertex")
     } else {
         return Ok(());
     };
@@ -90,9 +84,7 @@ impl Picture {
         Ok(Picture {
             reference_point: scene.reference_point,
             diagonal,
-            metres_per_newton: scene
-                .arrow_metres_per_newton
-                .unwrap_or(diagonal / NEWTONS_PER_DIAGONAL),
+            metres_per_newton: diagonal / NEWTONS_PER_DIAGONAL,
             head,
             moving: moving_paths(scene),
             erased_ns: None,
@@ -188,17 +180,10 @@ impl Picture {
 
 /// The mesh; for the god-object also its ghost at the device's pose.
 fn draw_body(stream: &RecordingStream, body: &MonitorBody) -> RecordingStreamResult<()> {
-    let mesh = match &body.normals {
-        Some(normals) => Mesh3D::new(body.vertices.iter().copied())
-            .with_triangle_indices(body.triangles.iter().copied())
-            .with_vertex_normals(normals.iter().copied()),
-        None => {
-            let mesh = shading::shaded(&body.vertices, &body.triangles);
-            Mesh3D::new(mesh.vertices)
-                .with_triangle_indices(mesh.triangles)
-                .with_vertex_normals(mesh.normals)
-        }
-    };
+    let shaded = shading::shaded(&body.vertices, &body.triangles);
+    let mesh = Mesh3D::new(shaded.vertices)
+        .with_triangle_indices(shaded.triangles)
+        .with_vertex_normals(shaded.normals);
     match body.role {
         BodyRole::Obstacle | BodyRole::MovingObstacle => {
             let [r, g, b] = body.colour.unwrap_or(colours::OBSTACLE);
@@ -355,7 +340,6 @@ mod tests {
                 sample.contacts.push(ShownContact {
                     point: Point3::origin(),
                     normal: Vector3::z(),
-                    gap: 0.0,
                 });
             }
             picture.show_contacts(&stream, &sample).unwrap();

@@ -187,8 +187,6 @@ pub struct ShownContact {
     pub point: Point3<f64>,
     /// Unit normal, obstacle → god-object, world axes.
     pub normal: Vector3<f64>,
-    /// Gap, metres, ≥ 0.
-    pub gap: f64,
 }
 
 /// Up to [`MAX_SHOWN_CONTACTS`] contacts, and how many there were.
@@ -225,7 +223,6 @@ impl Default for ShownContacts {
         let none = ShownContact {
             point: Point3::origin(),
             normal: Vector3::zeros(),
-            gap: 0.0,
         };
         ShownContacts {
             shown: [none; MAX_SHOWN_CONTACTS],
@@ -255,7 +252,6 @@ mod tests {
             .map(|i| ShownContact {
                 point: Point3::new(i as f64, 0.0, 0.0),
                 normal: Vector3::z(),
-                gap: 0.0,
             })
             .collect();
         assert_eq!(contacts.as_slice().len(), MAX_SHOWN_CONTACTS);

@@ -24,8 +24,6 @@ pub struct MonitorScene {
     pub reference_point: Point3<f64>,
     /// The direction that is up in the picture, world axes; need not be a unit vector.
     pub up: Vector3<f64>,
-    /// Length of the force arrow, metres per newton. `None`: 8 N is as long as the god-object's diagonal.
-    pub arrow_metres_per_newton: Option<f64>,
 }
 
 impl MonitorScene {
@@ -40,7 +38,6 @@ impl MonitorScene {
             head_size: 1.0,
             reference_point: Point3::origin(),
             up: Vector3::z(),
-            arrow_metres_per_newton: None,
         }
     }
 }
@@ -52,8 +49,6 @@ pub struct MonitorBody {
     pub name: String,
     /// Vertices in the body frame, metres.
     pub vertices: Vec<[f32; 3]>,
-    /// Unit vertex normals, as many as vertices. `None`: computed so that creases stay sharp.
-    pub normals: Option<Vec<[f32; 3]>>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Colour, sRGB. `None`: the role's own colour.

@@ -1,4 +1,4 @@
-//! Vertex normals for meshes that come without: smooth over gentle bends, sharp at creases.
+//! Vertex normals of meshes: smooth over gentle bends, sharp at creases.
 
 use nalgebra::{Point3, Vector3};
 

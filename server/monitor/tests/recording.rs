@@ -19,7 +19,6 @@ fn tetrahedron(name: &str, role: BodyRole) -> MonitorBody {
             [0.0, 0.1, 0.0],
             [0.0, 0.0, 0.1],
         ],
-        normals: None,
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
         colour: None,
         role,
@@ -56,7 +55,6 @@ fn sample(index: u64) -> MonitorSample {
     sample.contacts.push(ShownContact {
         point: Point3::new(0.0, 0.0, 0.1),
         normal: Vector3::z(),
-        gap: 0.0,
     });
     sample.packets_sent = 10 * index;
     sample

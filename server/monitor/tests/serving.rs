@@ -302,7 +302,6 @@ fn an_observer_who_joins_late_gets_the_scene_the_layout_and_the_present() {
     let tool = MonitorBody {
         name: "tool".into(),
         vertices: vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
-        normals: None,
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
         colour: None,
         role: BodyRole::GodObject,

@@ -156,7 +156,6 @@ fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
                 .iter()
                 .map(|v| [v.x as f32, v.y as f32, v.z as f32])
                 .collect(),
-            normals: None,
             triangles: mesh.triangles().to_vec(),
             colour: colours.next().flatten(),
             role,
@@ -258,7 +257,6 @@ fn sample(sources: &mut MonitorSources, frame: &SceneFrame) -> MonitorSample {
             .map(|c| ShownContact {
                 point: c.point,
                 normal: c.normal,
-                gap: c.gap,
             })
             .collect(),
         // Nothing near is no gap to plot.
