@@ -36,11 +36,9 @@ const APPLICATION: &str = "taut";
 
 pub use error::{InspectError, MonitorError};
 pub use inspect::{RrdSummary, inspect, observe, observe_times};
-pub use log::{LogLevel, MonitorLog};
+pub use log::LogLevel;
 pub use monitor::{Monitor, MonitorStats};
-pub use options::{
-    DEFAULT_GRPC_PORT, DEFAULT_MEMORY_LIMIT_BYTES, DEFAULT_WEB_PORT, MonitorOptions,
-};
+pub use options::MonitorOptions;
 pub use queue::MonitorSender;
 pub use sample::{
     Envelope, LoopTime, MAX_MOVING_OBSTACLES, MAX_SHOWN_CONTACTS, MonitorSample, MovingObstacles,

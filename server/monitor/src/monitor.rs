@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -15,7 +15,7 @@ use rerun::{RecordingStream, RecordingStreamBuilder};
 use crate::error::MonitorError;
 use crate::history::History;
 use crate::hosted::Hosted;
-use crate::log::{Command, LINE_QUEUE_CAPACITY, LogLevel, MonitorLog};
+use crate::log::{Command, LINE_QUEUE_CAPACITY, LogLevel};
 use crate::options::MonitorOptions;
 use crate::ports::{self, GRPC_KEY, WEB_KEY};
 use crate::queue::{self, Counters, MonitorReceiver, MonitorSender, SAMPLE_CAPACITY};
@@ -36,7 +36,8 @@ const BYTES_IN_FLIGHT: u64 = 128 * 1024;
 /// A running monitor. Dropping it stops it as [`Monitor::stop`] does.
 #[derive(Debug)]
 pub struct Monitor {
-    log: MonitorLog,
+    commands: SyncSender<Command>,
+    lines_dropped: Arc<AtomicU64>,
     counters: Arc<Counters>,
     messages_dropped: Arc<AtomicU64>,
     thread: Option<JoinHandle<Result<(), String>>>,
@@ -103,10 +104,8 @@ impl Monitor {
             .map_err(MonitorError::Thread)?;
 
         let monitor = Monitor {
-            log: MonitorLog {
-                commands,
-                dropped: lines_dropped,
-            },
+            commands,
+            lines_dropped,
             counters,
             messages_dropped,
             thread: Some(thread),
@@ -135,9 +134,15 @@ impl Monitor {
         self.recording.as_deref()
     }
 
-    /// Shows a line at the newest session time; never waits.
+    /// Shows a line at the newest session time; never waits: drops and counts it when too many wait. Not for the loops.
     pub fn log(&self, level: LogLevel, text: impl Into<String>) {
-        self.log.log(level, text);
+        match self.commands.try_send(Command::Line(level, text.into())) {
+            // Disconnected: the thread has ended, nobody looks any more.
+            Ok(()) | Err(TrySendError::Disconnected(_)) => {}
+            Err(TrySendError::Full(_)) => {
+                self.lines_dropped.fetch_add(1, Ordering::Relaxed);
+            }
+        }
     }
 
     /// What was shown and dropped so far.
@@ -148,7 +153,7 @@ impl Monitor {
             samples_shown: read(&self.counters.samples_shown),
             samples_dropped: read(&self.counters.samples_dropped),
             samples_not_finite: read(&self.counters.samples_not_finite),
-            lines_dropped: read(&self.log.dropped),
+            lines_dropped: read(&self.lines_dropped),
             messages_dropped: read(&self.messages_dropped),
         }
     }
@@ -164,7 +169,7 @@ impl Monitor {
             return Ok(());
         };
         // Fails only when the thread has ended already, which the join tells.
-        let _ = self.log.commands.send(Command::Stop);
+        let _ = self.commands.send(Command::Stop);
         let closed = thread.join().map_err(|_| MonitorError::ThreadLost)?;
         closed.map_err(|reason| MonitorError::Record {
             path: self.recording.clone().unwrap_or_default(),

@@ -3,19 +3,12 @@
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
-/// Port on which the native viewer and the web page fetch the stream, unless told otherwise.
-pub const DEFAULT_GRPC_PORT: u16 = 9876;
-/// Port of the web page, unless told otherwise.
-pub const DEFAULT_WEB_PORT: u16 = 9090;
-/// History that a late observer gets, unless told otherwise, in bytes.
-pub const DEFAULT_MEMORY_LIMIT_BYTES: u64 = 128 * 1024 * 1024;
-
 /// How to monitor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MonitorOptions {
     /// Address to listen on. Whoever reaches it may look on, so the default is this machine only.
     pub bind: IpAddr,
-    /// TCP port of the stream; 0 takes a free one.
+    /// TCP port on which the native viewer and the web page fetch the stream; 0 takes a free one.
     pub grpc_port: u16,
     /// TCP port of the web page; 0 takes a free one.
     pub web_port: u16,
@@ -31,10 +24,10 @@ impl Default for MonitorOptions {
     fn default() -> MonitorOptions {
         MonitorOptions {
             bind: IpAddr::V4(Ipv4Addr::LOCALHOST),
-            grpc_port: DEFAULT_GRPC_PORT,
-            web_port: DEFAULT_WEB_PORT,
+            grpc_port: 9876,
+            web_port: 9090,
             record: None,
-            memory_limit_bytes: DEFAULT_MEMORY_LIMIT_BYTES,
+            memory_limit_bytes: 128 * 1024 * 1024,
             serve: true,
         }
     }
