@@ -19,16 +19,12 @@ use crate::error::InspectError;
 /// What a recording or a stream holds, blueprints aside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RrdSummary {
-    /// Entity paths, sorted.
-    pub entities: Vec<String>,
     /// Rows per entity path: one row is one set of values at one time.
     pub rows: BTreeMap<String, u64>,
-    /// Names of the timelines, sorted.
-    pub timelines: Vec<String>,
-    /// First session time of any row, seconds.
-    pub first_time_s: Option<f64>,
-    /// Last session time of any row, seconds.
-    pub last_time_s: Option<f64>,
+    /// Names of the timelines.
+    pub timelines: BTreeSet<String>,
+    /// First and last session time of any row, nanoseconds.
+    pub time_ns: Option<(i64, i64)>,
     /// Blueprints (layouts of the viewer).
     pub blueprints: usize,
     /// Bytes of values and times per entity path, uncompressed.
@@ -52,21 +48,21 @@ pub fn inspect(path: &Path) -> Result<RrdSummary, InspectError> {
 
     let messages = DecoderApp::decode_eager(BufReader::new(file))
         .map_err(|error| decode(error.to_string()))?;
-    let mut contents = Contents::default();
+    let mut summary = RrdSummary::default();
     for message in messages {
         let message = message.map_err(|error| decode(error.to_string()))?;
-        contents.add(&message).map_err(decode)?;
+        summary.add(&message).map_err(decode)?;
     }
-    Ok(contents.summary())
+    Ok(summary)
 }
 
 /// Looks on at a running session for a while, as a viewer on another machine does.
 ///
 /// `stream_address` is what [`crate::Monitor::stream_address`] says. A stream that ends early is no error.
 pub fn observe(stream_address: &str, duration: Duration) -> Result<RrdSummary, InspectError> {
-    let mut contents = Contents::default();
-    follow(stream_address, duration, |message| contents.add(message))?;
-    Ok(contents.summary())
+    let mut summary = RrdSummary::default();
+    follow(stream_address, duration, |message| summary.add(message))?;
+    Ok(summary)
 }
 
 /// Looks on in the same way; `told` gets the newest session time of every message as it arrives, ns.
@@ -76,9 +72,9 @@ pub fn observe_times(
     mut on_newest: impl FnMut(u64),
 ) -> Result<(), InspectError> {
     follow(stream_address, duration, |message| {
-        let mut contents = Contents::default();
-        contents.add(message)?;
-        if let Some((_, newest)) = contents.time_ns {
+        let mut summary = RrdSummary::default();
+        summary.add(message)?;
+        if let Some((_, newest)) = summary.time_ns {
             on_newest(newest.unsigned_abs());
         }
         Ok(())
@@ -130,18 +126,7 @@ fn follow(
     Ok(())
 }
 
-#[derive(Default)]
-struct Contents {
-    rows: BTreeMap<String, u64>,
-    timelines: BTreeSet<String>,
-    time_ns: Option<(i64, i64)>,
-    blueprints: usize,
-    bytes: BTreeMap<String, u64>,
-    numbers: BTreeMap<String, (f64, f64)>,
-    lines: Vec<String>,
-}
-
-impl Contents {
+impl RrdSummary {
     fn add(&mut self, message: &LogMsg) -> Result<(), String> {
         match message {
             LogMsg::ArrowMsg(store, arrow) if store.kind() == StoreKind::Recording => {
@@ -181,21 +166,6 @@ impl Contents {
                 let (old_first, old_last) = self.time_ns.unwrap_or((first, last));
                 self.time_ns = Some((old_first.min(first), old_last.max(last)));
             }
-        }
-    }
-
-    fn summary(self) -> RrdSummary {
-        let seconds = |nanoseconds: i64| nanoseconds as f64 * 1e-9;
-        RrdSummary {
-            entities: self.rows.keys().cloned().collect(),
-            rows: self.rows,
-            timelines: self.timelines.into_iter().collect(),
-            first_time_s: self.time_ns.map(|(first, _)| seconds(first)),
-            last_time_s: self.time_ns.map(|(_, last)| seconds(last)),
-            blueprints: self.blueprints,
-            bytes: self.bytes,
-            numbers: self.numbers,
-            lines: self.lines,
         }
     }
 }
