@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 use re_async::AsyncRuntimeHandle;
 use re_log_channel::{DataSourceMessage, RecvTimeoutError, SmartMessagePayload};
 use rerun::StoreKind;
-use rerun::external::re_byte_size::SizeBytes as _;
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::{re_grpc_client, re_uri};
 use rerun::log::{Chunk, LogMsg};
@@ -27,8 +26,6 @@ pub struct RrdSummary {
     pub time_ns: Option<(i64, i64)>,
     /// Blueprints (layouts of the viewer).
     pub blueprints: usize,
-    /// Bytes of values and times per entity path, uncompressed.
-    pub bytes: BTreeMap<String, u64>,
     /// Least and largest number of a plot per entity path.
     pub numbers: BTreeMap<String, (f64, f64)>,
     /// The log's lines.
@@ -140,19 +137,12 @@ impl RrdSummary {
     }
 
     fn add_chunk(&mut self, chunk: &Chunk) {
-        *self
-            .rows
-            .entry(chunk.entity_path().to_string())
-            .or_default() += chunk.num_rows() as u64;
-        *self
-            .bytes
-            .entry(chunk.entity_path().to_string())
-            .or_default() += chunk.total_size_bytes();
+        let path = chunk.entity_path().to_string();
+        *self.rows.entry(path.clone()).or_default() += chunk.num_rows() as u64;
         let scalars = rerun::Scalars::descriptor_scalars().component;
         for number in chunk.iter_slices::<f64>(scalars).flatten() {
             let none = (f64::INFINITY, f64::NEG_INFINITY);
-            let path = chunk.entity_path().to_string();
-            let (least, largest) = self.numbers.entry(path).or_insert(none);
+            let (least, largest) = self.numbers.entry(path.clone()).or_insert(none);
             (*least, *largest) = (least.min(*number), largest.max(*number));
         }
         let text = rerun::TextLog::descriptor_text().component;
