@@ -9,12 +9,12 @@
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use futures_util::{SinkExt, StreamExt};
 use tokio::io::AsyncWriteExt;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{broadcast, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, broadcast, watch};
 use tokio::time::timeout;
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
@@ -62,16 +62,12 @@ pub struct StreamSettings {
 #[derive(Debug)]
 pub struct StreamServer {
     address: SocketAddr,
-    counts: Arc<Counts>,
+    max_observers: usize,
+    places: Arc<Semaphore>,
+    dropped: Arc<AtomicU64>,
     entrance: Entrance,
     metrics: watch::Sender<Option<Arc<str>>>,
     _service: Service,
-}
-
-#[derive(Debug, Default)]
-struct Counts {
-    observers: AtomicUsize,
-    dropped: AtomicU64,
 }
 
 /// What every observer's task knows.
@@ -82,13 +78,11 @@ struct Shared {
     states: watch::Receiver<Option<Arc<Utf8Bytes>>>,
     events: broadcast::Sender<Utf8Bytes>,
     metrics: watch::Receiver<Option<Arc<str>>>,
-    counts: Arc<Counts>,
-    max_observers: usize,
+    /// Of observers.
+    places: Arc<Semaphore>,
+    dropped: Arc<AtomicU64>,
     entrance: Entrance,
 }
-
-/// A place among the observers; dropped, it is free again.
-struct Place(Arc<Counts>);
 
 impl StreamServer {
     /// Opens the port and serves what `feed` has.
@@ -101,7 +95,9 @@ impl StreamServer {
         let listener = listen(settings.address)?;
         let address = listener.local_addr()?;
         drop(guard);
-        let (counts, entrance) = (Arc::<Counts>::default(), Entrance::default());
+        let max_observers = settings.max_observers;
+        let places = Arc::new(Semaphore::new(max_observers));
+        let (dropped, entrance) = (Arc::<AtomicU64>::default(), Entrance::default());
         let (sender, states) = watch::channel(None);
         let (events, _) = broadcast::channel(EVENT_LINES);
         let (metrics, shown_metrics) = watch::channel(None);
@@ -111,8 +107,8 @@ impl StreamServer {
             states,
             events: events.clone(),
             metrics: shown_metrics,
-            counts: counts.clone(),
-            max_observers: settings.max_observers,
+            places: places.clone(),
+            dropped: dropped.clone(),
             entrance: entrance.clone(),
         };
         let mut trail = EventLines::new(settings.naming);
@@ -128,7 +124,9 @@ impl StreamServer {
         })?;
         Ok(Self {
             address,
-            counts,
+            max_observers,
+            places,
+            dropped,
             entrance,
             metrics,
             _service: service,
@@ -149,7 +147,7 @@ impl StreamServer {
     /// Observers that are connected.
     #[must_use]
     pub fn observers(&self) -> usize {
-        self.counts.observers.load(Ordering::Relaxed)
+        self.max_observers - self.places.available_permits()
     }
 
     /// Clients that lost their place to ask from to others before they had asked.
@@ -161,24 +159,7 @@ impl StreamServer {
     /// Observers that were given up because they took nothing.
     #[must_use]
     pub fn dropped(&self) -> u64 {
-        self.counts.dropped.load(Ordering::Relaxed)
-    }
-}
-
-impl Shared {
-    /// A place among the observers, if there is one.
-    fn observe(&self) -> Option<Place> {
-        let observers = &self.counts.observers;
-        let taken = observers.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |observers| {
-            (observers < self.max_observers).then_some(observers + 1)
-        });
-        taken.ok().map(|_| Place(self.counts.clone()))
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        self.0.observers.fetch_sub(1, Ordering::Relaxed);
+        self.dropped.load(Ordering::Relaxed)
     }
 }
 
@@ -191,7 +172,7 @@ async fn accept(listener: TcpListener, shared: &Shared) {
             match observer(stream, &shared, asking).await {
                 Ok(()) => tracing::debug!("observer {peer} went"),
                 Err(End::Slow) => {
-                    shared.counts.dropped.fetch_add(1, Ordering::Relaxed);
+                    shared.dropped.fetch_add(1, Ordering::Relaxed);
                     tracing::info!("observer {peer} was given up: it takes nothing");
                 }
                 Err(End::Gone) => {}
@@ -244,8 +225,12 @@ async fn observer(mut stream: TcpStream, shared: &Shared, mut asking: Asking) ->
 }
 
 /// From asking to observing; where there is no place, that is told.
-async fn settle(stream: &mut TcpStream, shared: &Shared, asking: Asking) -> Result<Place, End> {
-    if let Some(place) = shared.observe() {
+async fn settle(
+    stream: &mut TcpStream,
+    shared: &Shared,
+    asking: Asking,
+) -> Result<OwnedSemaphorePermit, End> {
+    if let Ok(place) = shared.places.clone().try_acquire_owned() {
         return Ok(place);
     }
     let (mut asking, status) = (asking, "503 Service Unavailable");

@@ -7,14 +7,14 @@
 use std::collections::HashSet;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use taut_proto::HotState;
 use taut_vrpn::{ServerError, ServerSession, Stamp, callback_address};
 use tokio::net::{TcpListener, TcpStream, UdpSocket};
-use tokio::sync::watch;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::time::{Instant, sleep, timeout, timeout_at};
 
 use crate::feed::StateFeed;
@@ -45,29 +45,24 @@ pub struct VrpnSettings {
 #[derive(Debug)]
 pub struct VrpnServer {
     address: SocketAddrV4,
-    counts: Arc<Counts>,
+    max_clients: usize,
+    places: Arc<Semaphore>,
+    dropped: Arc<AtomicU64>,
     _service: Service,
-}
-
-#[derive(Debug, Default)]
-struct Counts {
-    clients: AtomicUsize,
-    dropped: AtomicU64,
 }
 
 /// What every client's task knows.
 #[derive(Clone)]
 struct Shared {
     settings: Arc<VrpnSettings>,
-    counts: Arc<Counts>,
+    /// Of clients.
+    places: Arc<Semaphore>,
+    dropped: Arc<AtomicU64>,
     states: watch::Receiver<Option<Arc<HotState>>>,
     datagrams: Arc<UdpSocket>,
     /// Who is being dialled or was: clients ask until they are.
     called: Arc<Mutex<HashSet<SocketAddrV4>>>,
 }
-
-/// A place among the clients; dropped, it is free again.
-struct Place(Arc<Counts>);
 
 impl VrpnServer {
     /// Opens the ports and serves what `feed` has.
@@ -81,12 +76,14 @@ impl VrpnServer {
         let address = ipv4(&listener)?;
         let datagrams = Arc::new(datagrams);
         drop(guard);
-        let counts = Arc::<Counts>::default();
         let (sender, states) = watch::channel(None);
-        let rate = settings.rate;
+        let (rate, max_clients) = (settings.rate, settings.max_clients);
+        let places = Arc::new(Semaphore::new(max_clients));
+        let dropped = Arc::<AtomicU64>::default();
         let shared = Shared {
             settings: Arc::new(settings),
-            counts: counts.clone(),
+            places: places.clone(),
+            dropped: dropped.clone(),
             states,
             datagrams,
             called: Arc::default(),
@@ -100,7 +97,9 @@ impl VrpnServer {
         })?;
         Ok(Self {
             address,
-            counts,
+            max_clients,
+            places,
+            dropped,
             _service: service,
         })
     }
@@ -114,13 +113,13 @@ impl VrpnServer {
     /// Clients that are connected.
     #[must_use]
     pub fn clients(&self) -> usize {
-        self.counts.clients.load(Ordering::Relaxed)
+        self.max_clients - self.places.available_permits()
     }
 
     /// Clients whose connection was ended here: garbage, silence, or reports that they did not take.
     #[must_use]
     pub fn dropped(&self) -> u64 {
-        self.counts.dropped.load(Ordering::Relaxed)
+        self.dropped.load(Ordering::Relaxed)
     }
 }
 
@@ -160,22 +159,8 @@ fn ipv4(listener: &TcpListener) -> io::Result<SocketAddrV4> {
 }
 
 impl Shared {
-    /// A place for one more client, if there is one.
-    fn place(&self) -> Option<Place> {
-        let most = self.settings.max_clients;
-        self.counts
-            .clients
-            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |clients| {
-                (clients < most).then_some(clients + 1)
-            })
-            .is_ok()
-            .then(|| Place(self.counts.clone()))
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        self.0.clients.fetch_sub(1, Ordering::Relaxed);
+    fn called(&self) -> MutexGuard<'_, HashSet<SocketAddrV4>> {
+        self.called.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -183,7 +168,7 @@ async fn accept(listener: TcpListener, shared: &Shared) {
     loop {
         // Without a place the connection is closed at once.
         if let (stream, SocketAddr::V4(peer)) = accepted(&listener).await
-            && let Some(place) = shared.place()
+            && let Ok(place) = shared.places.clone().try_acquire_owned()
         {
             tokio::spawn(client(stream, *peer.ip(), shared.clone(), place));
         }
@@ -202,21 +187,13 @@ async fn call_back(shared: &Shared) {
         let Some(address) = callback_address(&buffer[..length], *from.ip()) else {
             continue;
         };
-        let called = &shared.called;
-        if called
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .contains(&address)
-        {
+        if shared.called().contains(&address) {
             continue;
         }
-        let Some(place) = shared.place() else {
+        let Ok(place) = shared.places.clone().try_acquire_owned() else {
             continue;
         };
-        called
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .insert(address);
+        shared.called().insert(address);
         let shared = shared.clone();
         tokio::spawn(async move {
             if let Ok(socket) = dialling_socket()
@@ -224,21 +201,17 @@ async fn call_back(shared: &Shared) {
             {
                 client(stream, *address.ip(), shared.clone(), place).await;
             }
-            shared
-                .called
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .remove(&address);
+            shared.called().remove(&address);
         });
     }
 }
 
 /// Serves one client until it goes or is given up.
-async fn client(stream: TcpStream, peer: Ipv4Addr, shared: Shared, _place: Place) {
+async fn client(stream: TcpStream, peer: Ipv4Addr, shared: Shared, _place: OwnedSemaphorePermit) {
     match serve(&stream, peer, &shared).await {
         Ok(()) => tracing::debug!("VRPN client {peer} went"),
         Err(end) => {
-            shared.counts.dropped.fetch_add(1, Ordering::Relaxed);
+            shared.dropped.fetch_add(1, Ordering::Relaxed);
             tracing::info!("VRPN client {peer} was given up: {end}");
         }
     }
