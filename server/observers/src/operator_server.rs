@@ -37,10 +37,6 @@ const PAGE: &str = include_str!("operator.html");
 const MAX_VIEWERS: usize = 16;
 /// Longest that the device port is waited for.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Longest that a changed scene is waited for: its meshes are read and checked.
-const EDIT_PATIENCE: Duration = Duration::from_secs(120);
-/// Longest that pictures are waited for: longer than a node is.
-const PICTURES_PATIENCE: Duration = Duration::from_secs(20);
 /// Time between two looks at what it did.
 const LOOK_PERIOD: Duration = Duration::from_millis(5);
 /// A deed was not done.
@@ -49,16 +45,6 @@ const NOT_DONE: &str = "409 Conflict";
 const NO_ANSWER: (&str, &str) = (
     "504 Gateway Timeout",
     "asked, but the device port has not answered; look at the device and at the server's log",
-);
-/// The same of a scene.
-const NOT_YET_TAKEN: (&str, &str) = (
-    "504 Gateway Timeout",
-    "the scene is being read still; look at the server's log for what comes of it",
-);
-/// The same of pictures.
-const NO_PICTURES: (&str, &str) = (
-    "504 Gateway Timeout",
-    "asked, but the pictures are not there yet; look at the server's log",
 );
 /// A picture of before.
 const GONE: (&str, &str) = (
@@ -213,14 +199,22 @@ struct Patience {
     kind: &'static str,
 }
 
+/// Of a changed scene: its meshes are read and checked.
 const EDITING: Patience = Patience {
-    longest: EDIT_PATIENCE,
-    silent: NOT_YET_TAKEN,
+    longest: Duration::from_secs(120),
+    silent: (
+        "504 Gateway Timeout",
+        "the scene is being read still; look at the server's log for what comes of it",
+    ),
     kind: TEXT,
 };
+/// Of pictures: longer than a node is waited for.
 const PICTURING: Patience = Patience {
-    longest: PICTURES_PATIENCE,
-    silent: NO_PICTURES,
+    longest: Duration::from_secs(20),
+    silent: (
+        "504 Gateway Timeout",
+        "asked, but the pictures are not there yet; look at the server's log",
+    ),
     kind: JSON_LINES,
 };
 
