@@ -26,6 +26,8 @@ mod publisher;
 #[cfg(feature = "zenoh")]
 mod ros;
 #[cfg(feature = "zenoh")]
+mod routers;
+#[cfg(feature = "zenoh")]
 mod wrench;
 
 /// Zenoh itself, for those who receive.

@@ -1,10 +1,9 @@
 //! The publisher: a thread that reads the newest state at its own rate and puts it on Zenoh's keys.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use taut_observers::lines::{Naming, state_line};
@@ -14,12 +13,10 @@ use taut_proto::codec::encode_onto;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
-use zenoh::{Config, Session, Wait};
+use zenoh::{Session, Wait};
 
 use crate::ros::{RosSettings, RosTopics};
-
-/// Time between two attempts to reach a router.
-const RETRY_PERIOD: Duration = Duration::from_secs(1);
+use crate::routers::{Routers, client_config, sleep_until};
 
 /// How the publisher is set up.
 #[derive(Clone, Debug)]
@@ -59,9 +56,8 @@ pub enum ZenohError {
 pub struct ZenohPublisher {
     prefix: String,
     ros_namespace: Option<String>,
-    stop: Arc<AtomicBool>,
     published: Arc<AtomicU64>,
-    thread: Option<JoinHandle<()>>,
+    _thread: Routers,
 }
 
 impl ZenohPublisher {
@@ -74,14 +70,11 @@ impl ZenohPublisher {
         hello: &Hello,
         feed: StateFeed,
     ) -> Result<Self, ZenohError> {
-        let config = client_config(&settings.connect, settings.config.as_deref())
-            .map_err(|error| ZenohError::Config(error.to_string()))?;
+        let config = client_config(&settings.connect, settings.config.as_deref())?;
         let prefix = format!("taut/{}", settings.name);
         let ros_namespace = settings.ros.map(|_| format!("/{}", settings.name));
-        let stop = Arc::<AtomicBool>::default();
         let published = Arc::<AtomicU64>::default();
-        let work = Work {
-            config,
+        let mut work = Work {
             prefix: prefix.clone(),
             hello: hello.line(),
             ros: settings
@@ -89,18 +82,18 @@ impl ZenohPublisher {
                 .map(|ros| (ros, settings.name, hello.scene.clone())),
             period: Duration::from_secs_f64(settings.rate.recip()),
             trail: EventLines::new(settings.naming),
-            stop: stop.clone(),
             published: published.clone(),
         };
-        let thread = std::thread::Builder::new()
-            .name("zenoh".to_owned())
-            .spawn(move || work.run(feed))?;
+        let thread = Routers::reach("zenoh", config, move |session, stop| {
+            if let Err(error) = work.publish(session, feed, stop) {
+                tracing::error!("[zenoh] ended: {error}");
+            }
+        })?;
         Ok(Self {
             prefix,
             ros_namespace,
-            stop,
             published,
-            thread: Some(thread),
+            _thread: thread,
         })
     }
 
@@ -123,55 +116,22 @@ impl ZenohPublisher {
     }
 }
 
-impl Drop for ZenohPublisher {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // A panic of it is no fault of the loops; it has been printed.
-            let _ = thread.join();
-        }
-    }
-}
-
-/// Zenoh's configuration: the file's, as a client of routers that listens nowhere and looks for nobody by itself.
-pub(crate) fn client_config(connect: &[String], file: Option<&Path>) -> zenoh::Result<Config> {
-    let mut config = match file {
-        Some(path) => Config::from_file(path)?,
-        None => Config::default(),
-    };
-    config.insert_json5("mode", "\"client\"")?;
-    config.insert_json5("scouting/multicast/enabled", "false")?;
-    if !connect.is_empty() {
-        let routers: Vec<String> = connect.iter().map(|r| format!("{r:?}")).collect();
-        config.insert_json5("connect/endpoints", &format!("[{}]", routers.join(",")))?;
-    }
-    Ok(config)
-}
-
 struct Work {
-    config: Config,
     prefix: String,
     hello: String,
     ros: Option<(RosSettings, String, SceneDescription)>,
     period: Duration,
     trail: EventLines,
-    stop: Arc<AtomicBool>,
     published: Arc<AtomicU64>,
 }
 
 impl Work {
-    fn run(mut self, feed: StateFeed) {
-        let Some(session) = open(&self.config, &self.stop) else {
-            return;
-        };
-        if let Err(error) = self.publish(&session, feed) {
-            tracing::error!("[zenoh] ended: {error}");
-        }
-        // It ends with this thread; a router that does not hear of it notices.
-        let _ = session.close().wait();
-    }
-
-    fn publish(&mut self, session: &Session, mut feed: StateFeed) -> zenoh::Result<()> {
+    fn publish(
+        &mut self,
+        session: &Session,
+        mut feed: StateFeed,
+        stop: &AtomicBool,
+    ) -> zenoh::Result<()> {
         let key = |name: &str| format!("{}/{name}", self.prefix);
         let newest_wins = |name: &str, encoding: Encoding| {
             session
@@ -214,7 +174,7 @@ impl Work {
         let mut ros = ros.transpose()?;
         let mut payload = Vec::new();
         let mut deadline = Instant::now();
-        while !self.stop.load(Ordering::Relaxed) {
+        while !stop.load(Ordering::Relaxed) {
             if let Some(fresh) = feed.fresh() {
                 let state = fresh.state;
                 for line in self.trail.take(fresh) {
@@ -233,37 +193,8 @@ impl Work {
             }
             // Late ones are given up, not made up for.
             deadline = (deadline + self.period).max(Instant::now());
-            sleep_until(deadline, &self.stop);
+            sleep_until(deadline, stop);
         }
         Ok(())
-    }
-}
-
-/// The session with a router; `None` where the end came before one was reached.
-pub(crate) fn open(config: &Config, stop: &AtomicBool) -> Option<Session> {
-    let mut warned = false;
-    while !stop.load(Ordering::Relaxed) {
-        match zenoh::open(config.clone()).wait() {
-            Ok(session) => return Some(session),
-            Err(error) if !warned => {
-                tracing::warn!("[zenoh] reaches no router and goes on trying: {error}");
-                warned = true;
-            }
-            Err(_) => {}
-        }
-        sleep_until(Instant::now() + RETRY_PERIOD, stop);
-    }
-    None
-}
-
-/// Sleeps in pieces that keep the end from waiting.
-fn sleep_until(end: Instant, stop: &AtomicBool) {
-    const PIECE: Duration = Duration::from_millis(100);
-    while !stop.load(Ordering::Relaxed) {
-        let left = end.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return;
-        }
-        std::thread::sleep(left.min(PIECE));
     }
 }

@@ -5,9 +5,7 @@
 
 use std::net::IpAddr;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use god_object::spatial::Vector6;
@@ -16,8 +14,9 @@ use taut_ros::{Attachment, Domain, ReceivedWrench, WrenchStamped};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Config, Wait};
 
-use crate::publisher::{ZenohError, client_config, open};
+use crate::publisher::ZenohError;
 use crate::ros::node;
+use crate::routers::{Routers, client_config};
 
 /// Name of the node that subscribes.
 const NODE: &str = "taut_wrench_in";
@@ -62,9 +61,7 @@ pub enum RosWrench {
 /// A running subscription. Dropped, it ends.
 #[derive(Debug)]
 pub struct RosWrenchSubscriber {
-    key: String,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: Routers,
 }
 
 impl RosWrenchSubscriber {
@@ -76,61 +73,30 @@ impl RosWrenchSubscriber {
         settings: RosWrenchSettings,
         mut taker: impl FnMut(RosWrench) + Send + Sync + 'static,
     ) -> Result<Self, ZenohError> {
-        let config = client_config(&settings.connect, settings.config.as_deref())
-            .map_err(|error| ZenohError::Config(error.to_string()))?;
+        let config = client_config(&settings.connect, settings.config.as_deref())?;
         if !settings.allow_unproven {
             check_proven(&config)?;
         }
-        let key = key::<WrenchStamped<'_>>(settings.domain, &settings.topic);
-        let stop = Arc::<AtomicBool>::default();
-        let (stopping, wanted) = (stop.clone(), key.clone());
-        let thread = std::thread::Builder::new()
-            .name("zenoh-wrench".to_owned())
-            .spawn(move || {
-                let Some(session) = open(&config, &stopping) else {
-                    return;
-                };
-                let node = node(&session, settings.domain, &settings.name, NODE);
-                let token = node.subscription::<WrenchStamped<'_>>(1, &settings.topic);
-                let subscribed = (|| {
-                    let subscriber = session
-                        .declare_subscriber(wanted)
-                        .callback_mut(move |sample| taker(read(&sample)))
-                        .wait()?;
-                    let tokens = [node.token(), token]
-                        .map(|token| session.liveliness().declare_token(token).wait());
-                    zenoh::Result::Ok((subscriber, tokens))
-                })();
-                if let Err(error) = &subscribed {
-                    tracing::error!("the topic of [wrench_in] cannot be subscribed to: {error}");
-                }
-                while !stopping.load(Ordering::Relaxed) {
-                    std::thread::sleep(LOOK_PERIOD);
-                }
-                drop(subscribed);
-                let _ = session.close().wait();
-            })?;
-        Ok(Self {
-            key,
-            stop,
-            thread: Some(thread),
-        })
-    }
-
-    /// The key that is subscribed to.
-    #[must_use]
-    pub fn key(&self) -> &str {
-        &self.key
-    }
-}
-
-impl Drop for RosWrenchSubscriber {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // A panic of it is no fault of the loops; it has been printed.
-            let _ = thread.join();
-        }
+        let thread = Routers::reach("zenoh-wrench", config, move |session, stop| {
+            let node = node(session, settings.domain, &settings.name, NODE);
+            let token = node.subscription::<WrenchStamped<'_>>(1, &settings.topic);
+            let subscribed = (|| {
+                let subscriber = session
+                    .declare_subscriber(key::<WrenchStamped<'_>>(settings.domain, &settings.topic))
+                    .callback_mut(move |sample| taker(read(&sample)))
+                    .wait()?;
+                let tokens = [node.token(), token]
+                    .map(|token| session.liveliness().declare_token(token).wait());
+                zenoh::Result::Ok((subscriber, tokens))
+            })();
+            if let Err(error) = &subscribed {
+                tracing::error!("the topic of [wrench_in] cannot be subscribed to: {error}");
+            }
+            while !stop.load(Ordering::Relaxed) {
+                std::thread::sleep(LOOK_PERIOD);
+            }
+        })?;
+        Ok(Self { _thread: thread })
     }
 }
 
