@@ -31,12 +31,8 @@ pub struct Recorder {
 /// What came of a recording.
 #[derive(Debug, Default)]
 pub struct Summary {
-    /// Updates written.
-    pub updates: u64,
-    /// Ticks of the haptics loop written.
-    pub ticks: u64,
-    /// Forces written.
-    pub forces: u64,
+    /// Records written.
+    pub records: Records,
     /// Records that found their queue full.
     pub lost: Lost,
     /// Why the recording is not whole.
@@ -263,7 +259,7 @@ fn write_until(
     stop: &AtomicBool,
 ) -> Summary {
     let mut summary = Summary::default();
-    let written = write_records(&mut files, &mut drains, events, stop, &mut summary);
+    let written = write_records(&mut files, &mut drains, events, stop, &mut summary.records);
     summary.lost = Lost {
         haptics: drains.haptics.lost(),
         updates: drains.updates.lost(),
@@ -285,11 +281,7 @@ fn write_until(
         complete: reason.is_none(),
         reason,
         lost: summary.lost,
-        records: failure.is_none().then_some(Records {
-            haptics: summary.ticks,
-            updates: summary.updates,
-            forces: summary.forces,
-        }),
+        records: failure.is_none().then_some(summary.records),
         ..manifest
     };
     summary.failure = failure.or(write_manifest(directory, &manifest).err());
@@ -301,20 +293,20 @@ fn write_records(
     drains: &mut Drains,
     events: &Receiver<EventRecord>,
     stop: &AtomicBool,
-    summary: &mut Summary,
+    written: &mut Records,
 ) -> Result<(), RecordingError> {
     let mut looks = 0;
     loop {
         // Asked before the last look, so that nothing that was pushed before the question stays behind.
         let is_last = stop.load(Ordering::Acquire);
-        summary.ticks += drain(&mut drains.haptics, |record| files.tick(record))?;
-        summary.updates += drain(&mut drains.updates, |record| {
+        written.haptics += drain(&mut drains.haptics, |record| files.tick(record))?;
+        written.updates += drain(&mut drains.updates, |record| {
             files.updates.put(|line| record.write(line))
         })?;
         drain(&mut drains.constraints, |record| {
             files.constraints.put(|line| record.write(line))
         })?;
-        summary.forces += drain(&mut drains.forces, |record| {
+        written.forces += drain(&mut drains.forces, |record| {
             files.forces.put(|line| record.write(line))
         })?;
         for event in events.try_iter() {

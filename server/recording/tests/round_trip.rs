@@ -135,7 +135,7 @@ fn record(path: &Path) {
     });
     let summary = recorder.finish();
     assert!(summary.failure.is_none());
-    assert_eq!((summary.updates, summary.ticks), (6, 3));
+    assert_eq!((summary.records.updates, summary.records.haptics), (6, 3));
 }
 
 #[test]
@@ -195,7 +195,7 @@ fn a_writer_that_falls_behind_makes_the_recording_incomplete() {
     }
     let summary = recorder.finish();
     assert!(summary.lost.updates > 0);
-    assert_eq!(summary.updates + summary.lost.updates, pushed);
+    assert_eq!(summary.records.updates + summary.lost.updates, pushed);
     let recording = Recording::open(directory.path()).expect("an incomplete recording can be read");
     assert!(!recording.manifest().complete);
     assert_eq!(recording.manifest().lost, summary.lost);
