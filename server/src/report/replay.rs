@@ -101,16 +101,7 @@ impl fmt::Display for RecordedReport {
             "forces              {}, {} differ",
             self.forces, self.different_forces
         )?;
-        writeln!(
-            f,
-            "god-object update   p50 {:.1} us, p99 {:.1} us, max {:.1} us",
-            self.update_us.p50, self.update_us.p99, self.update_us.max
-        )?;
-        write!(
-            f,
-            "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us",
-            self.force_us.p50, self.force_us.p99, self.force_us.max
-        )?;
+        f.write_str(&said_of_times(&self.update_us, &self.force_us))?;
         if let Some(difference) = &self.first_difference {
             write!(f, "\nfirst difference    {difference}")?;
         }
@@ -124,16 +115,7 @@ impl fmt::Display for RecordedReport {
 impl fmt::Display for ReplayReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "rows                {}", self.steps)?;
-        writeln!(
-            f,
-            "god-object update   p50 {:.1} us, p99 {:.1} us, max {:.1} us",
-            self.update_us.p50, self.update_us.p99, self.update_us.max
-        )?;
-        writeln!(
-            f,
-            "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us",
-            self.force_us.p50, self.force_us.p99, self.force_us.max
-        )?;
+        writeln!(f, "{}", said_of_times(&self.update_us, &self.force_us))?;
         writeln!(
             f,
             "contacts            p50 {:.0}, max {:.0}; active max {:.0}",
@@ -166,6 +148,18 @@ impl fmt::Display for ReplayReport {
             self.kkt_max, self.solver_fallbacks, self.energy_injected_j
         )
     }
+}
+
+/// Times of one update and of one force, in two lines.
+fn said_of_times(update_us: &Distribution, force_us: &Distribution) -> String {
+    let said = |us: &Distribution| {
+        format!(
+            "p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            us.p50, us.p99, us.max
+        )
+    };
+    let (update, force) = (said(update_us), said(force_us));
+    format!("god-object update   {update}\nforce               {force}")
 }
 
 /// What updates say in which something stopped the body that gives no force, if there are any.
