@@ -11,6 +11,8 @@ use taut_bridge::realtime::{RealtimeGrant, request_fifo, sharpen_timers};
 
 use crate::shared::lock::lock;
 
+pub use os::{after_parent, die_with_parent, thread_cpu_time};
+
 /// Ahead of all normal work, behind the real-time class.
 const AHEAD_NICE: i32 = -10;
 /// A little behind normal work: a third of its share where both want a core.
@@ -168,22 +170,6 @@ fn note_once(lines: &mut Vec<String>, line: String) {
     }
 }
 
-/// CPU time that the calling thread has used: what its work costs, whoever else is running.
-#[inline]
-pub fn thread_cpu_time() -> Duration {
-    os::thread_cpu_time()
-}
-
-/// Ties a child process to the calling thread: the system kills it when that ends, however it ends.
-pub fn die_with_parent(command: &mut std::process::Command) {
-    os::die_with_parent(command);
-}
-
-/// Lets a child process work after this process's normal threads where both want a core.
-pub fn after_parent(command: &mut std::process::Command) {
-    os::after_parent(command);
-}
-
 #[cfg(target_os = "linux")]
 #[allow(
     unsafe_code,
@@ -196,7 +182,9 @@ mod os {
     /// Behind this process's normal threads, before background work.
     const CHILD_NICE: libc::c_int = 5;
 
-    pub(super) fn thread_cpu_time() -> Duration {
+    /// CPU time that the calling thread has used: what its work costs, whoever else is running.
+    #[inline]
+    pub fn thread_cpu_time() -> Duration {
         let mut time = libc::timespec {
             tv_sec: 0,
             tv_nsec: 0,
@@ -211,7 +199,8 @@ mod os {
         unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, value) == 0 }
     }
 
-    pub(super) fn after_parent(command: &mut std::process::Command) {
+    /// Lets a child process work after this process's normal threads where both want a core.
+    pub fn after_parent(command: &mut std::process::Command) {
         // SAFETY: between fork and exec only one system call is made, which is safe there; nothing is allocated or locked.
         unsafe {
             command.pre_exec(|| {
@@ -222,7 +211,8 @@ mod os {
         }
     }
 
-    pub(super) fn die_with_parent(command: &mut std::process::Command) {
+    /// Ties a child process to the calling thread: the system kills it when that ends, however it ends.
+    pub fn die_with_parent(command: &mut std::process::Command) {
         let parent = std::process::id();
         // SAFETY: between fork and exec only system calls are made that are safe there; nothing is allocated or locked.
         unsafe {
@@ -252,7 +242,7 @@ mod os {
 
     static START: OnceLock<Instant> = OnceLock::new();
 
-    pub(super) fn thread_cpu_time() -> Duration {
+    pub fn thread_cpu_time() -> Duration {
         START.get_or_init(Instant::now).elapsed()
     }
 
@@ -260,9 +250,9 @@ mod os {
         false
     }
 
-    pub(super) fn die_with_parent(_command: &mut std::process::Command) {}
+    pub fn die_with_parent(_command: &mut std::process::Command) {}
 
-    pub(super) fn after_parent(_command: &mut std::process::Command) {}
+    pub fn after_parent(_command: &mut std::process::Command) {}
 }
 
 #[cfg(test)]
