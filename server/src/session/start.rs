@@ -59,7 +59,7 @@ impl Session {
         kept.switch.begin_again();
         let from = StartingPoint::of(&mut setup, kept.handover.take())?;
         let clock = from.clock;
-        let to_monitor = ToMonitor::of(&setup);
+        let (opening, picture) = (opening(&setup), picture(&setup));
         let facts = setup.operator.as_ref().map(|page| Facts::of(&setup, page));
         let scene_revision = setup.content.description.revision;
         let policy = setup.link.policy.clone();
@@ -115,10 +115,10 @@ impl Session {
 
         // From here on a failure drops the session, which ends what was started.
         if let Some(settings) = &setup.monitor {
-            session.start_monitor(settings, &to_monitor.picture, sources, &mut fresh)?;
+            session.start_monitor(settings, &picture, sources, &mut fresh)?;
         }
         session.start_threads(threads, &setup.realtime)?;
-        session.log_start(&to_monitor.opening);
+        session.log_start(&opening);
         fresh.keep();
         Ok(session)
     }
@@ -273,21 +273,7 @@ impl WiredSession {
     }
 }
 
-/// What the monitor is told once: what its log begins with, and what it draws.
-struct ToMonitor {
-    opening: String,
-    picture: MonitorPicture,
-}
-
-impl ToMonitor {
-    fn of(setup: &SessionSetup) -> Self {
-        Self {
-            opening: opening(setup),
-            picture: picture(setup),
-        }
-    }
-}
-
+/// What the monitor's log begins with.
 fn opening(setup: &SessionSetup) -> String {
     let (body, settings) = (&setup.world.body, &setup.settings);
     let opening = format!(
@@ -309,6 +295,7 @@ fn opening(setup: &SessionSetup) -> String {
         .join("; ")
 }
 
+/// What the monitor draws.
 fn picture(setup: &SessionSetup) -> MonitorPicture {
     let description = &setup.content.description;
     MonitorPicture {
