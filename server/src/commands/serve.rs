@@ -189,7 +189,7 @@ pub(super) fn announce(session: &Session) {
         taut_log::say(&line);
     }
     if let Some(page) = session.operator() {
-        taut_log::say(&page.line());
+        taut_log::say(page.line());
     }
     for line in &session.realtime().waived {
         taut_log::say(&format!("not in force: {line}"));

@@ -1,6 +1,5 @@
 //! What the operator's page shows: one line of JSON, five times a second. What the metrics have is taken from there and not measured again.
 
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -85,7 +84,8 @@ struct Now {
 #[derive(Debug)]
 pub(crate) struct OperatorPage {
     door: Arc<OperatorDoor>,
-    token: Shown,
+    /// Where it is, and what opens it.
+    line: String,
     feed: StateFeed,
     facts: String,
     state: Now,
@@ -94,15 +94,6 @@ pub(crate) struct OperatorPage {
     /// The newest metrics as JSON.
     metrics: String,
     next: Duration,
-}
-
-/// What is said of the token when the server starts.
-#[derive(Debug)]
-enum Shown {
-    /// The token itself.
-    Fresh(String),
-    /// Where it is.
-    In(std::path::PathBuf),
 }
 
 impl Facts {
@@ -146,12 +137,19 @@ impl OperatorPage {
             scene_revision: desk.scenes().revision(),
             ..facts
         });
+        let (address, token) = (door.address(), &wanted.server.token);
+        let line = match &wanted.token_file {
+            None => format!(
+                "operator's page: http://{address}/#token={token} (who has this address can arm)"
+            ),
+            Some(file) => format!(
+                "operator's page: http://{address}/#token= and the line in {}",
+                file.display()
+            ),
+        };
         Ok(Self {
             door,
-            token: match &wanted.token_file {
-                Some(file) => Shown::In(file.clone()),
-                None => Shown::Fresh(wanted.server.token.clone()),
-            },
+            line,
             feed,
             facts,
             state: Now {
@@ -171,23 +169,9 @@ impl OperatorPage {
         self
     }
 
-    /// Where it is, with the port that it got.
-    pub(crate) fn address(&self) -> SocketAddr {
-        self.door.address()
-    }
-
     /// Where it is, and what opens it, for the person who started the server.
-    pub(crate) fn line(&self) -> String {
-        let address = self.address();
-        match &self.token {
-            Shown::Fresh(token) => format!(
-                "operator's page: http://{address}/#token={token} (who has this address can arm)"
-            ),
-            Shown::In(file) => format!(
-                "operator's page: http://{address}/#token= and the line in {}",
-                file.display()
-            ),
-        }
+    pub(crate) fn line(&self) -> &str {
+        &self.line
     }
 
     /// Takes who may join.
