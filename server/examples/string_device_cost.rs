@@ -89,7 +89,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         SafetySettings::default(),
         None,
     )
-    .with_motions(scene.motions);
+    .with_motions(scene.motions, Duration::ZERO);
     for tick in 1..=1000 * u64::from(seconds) {
         let now = Duration::from_millis(tick);
         loops.haptics.tick(now);

@@ -60,7 +60,7 @@ impl VirtualSession {
         };
         Self {
             loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety, None)
-                .with_motions(scene.motions.clone()),
+                .with_motions(scene.motions.clone(), Duration::ZERO),
             now: Duration::ZERO,
         }
     }

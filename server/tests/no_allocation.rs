@@ -54,7 +54,7 @@ fn wired(name: &str, strings: Option<&str>, taps: Taps) -> WiredLoops {
         SafetySettings::default(),
         Some(taps),
     )
-    .with_motions(scene.motions)
+    .with_motions(scene.motions, Duration::ZERO)
 }
 
 #[test]

@@ -106,24 +106,15 @@ impl GodObjectLoop {
 
     /// The same with obstacles that move, from the first update on; the first constraint set is published with their poses.
     ///
-    /// Motions beyond [`MAX_MOVING`] are left out: their obstacles stand.
+    /// Their traces begin at `on_traces`. Motions beyond [`MAX_MOVING`] are left out: their obstacles stand.
     #[must_use]
-    pub fn with_motions(mut self, mut motions: Vec<BuiltMotion>) -> Self {
+    pub fn with_motions(mut self, mut motions: Vec<BuiltMotion>, on_traces: Duration) -> Self {
         motions.truncate(MAX_MOVING);
         self.motions = motions;
+        (self.gone_on_from, self.on_traces) = (on_traces, on_traces);
         note_obstacles(&self.motions, &self.god_object, &mut self.snapshot.moving);
         self.contacts.publish(&self.snapshot);
         self
-    }
-
-    /// The same with traces that go on from `on_traces` and do not begin.
-    #[must_use]
-    pub fn going_on_from(self, on_traces: Duration) -> Self {
-        Self {
-            gone_on_from: on_traces,
-            on_traces,
-            ..self
-        }
     }
 
     /// Where everything stands now.

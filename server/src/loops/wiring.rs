@@ -171,20 +171,11 @@ impl WiredLoops {
         }
     }
 
-    /// The same with obstacles that move.
+    /// The same with obstacles that move, from `on_traces` of their traces on.
     #[must_use]
-    pub fn with_motions(self, motions: Vec<BuiltMotion>) -> Self {
+    pub fn with_motions(self, motions: Vec<BuiltMotion>, on_traces: Duration) -> Self {
         Self {
-            god_object: self.god_object.with_motions(motions),
-            ..self
-        }
-    }
-
-    /// The same with the traces of those obstacles gone on from there.
-    #[must_use]
-    pub fn going_on_from(self, on_traces: Duration) -> Self {
-        Self {
-            god_object: self.god_object.going_on_from(on_traces),
+            god_object: self.god_object.with_motions(motions, on_traces),
             ..self
         }
     }

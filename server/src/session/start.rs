@@ -88,8 +88,7 @@ impl Session {
             setup.safety,
             taps,
         )
-        .with_motions(setup.motions)
-        .going_on_from(from.on_traces)
+        .with_motions(setup.motions, from.on_traces)
         .with_external(device_side.external)
         .with_passed(device_side.passed)
         .with_arm_switch(kept.switch.clone());

@@ -361,7 +361,7 @@ impl Server {
                 safety,
                 None,
             )
-            .with_motions(scene.motions.clone()),
+            .with_motions(scene.motions.clone(), Duration::ZERO),
             inputs,
             newest: 0,
             wrenches,
