@@ -5,16 +5,12 @@ use super::*;
 #[test]
 fn a_service_takes_up_an_edited_scene_where_deploy_is_asked_for_that() {
     let place = prepared();
-    assert_eq!(deploy(&place, &[]).0, Some(0));
+    deployed(&place, &[]);
     let plain = command(&unpacked(&place, "haptic-pc"), "taut-serve.service");
     assert!(!plain.contains(&"--follow-scene".to_owned()), "{plain:?}");
-    let (code, said) = deploy(&place, &["--follow-scene"]);
-    assert!(
-        code == Some(2) && said.contains("--force"),
-        "another archive: {said}"
-    );
-    let (code, said) = deploy(&place, &["--follow-scene", "--force"]);
-    assert_eq!(code, Some(0), "{said}");
+    let said = refused(&place, &["--follow-scene"]);
+    assert!(said.contains("--force"), "another archive: {said}");
+    deployed(&place, &["--follow-scene", "--force"]);
 
     let folder = unpacked(&place, "haptic-pc");
     let unit = command(&folder, "taut-serve.service");
@@ -35,38 +31,35 @@ fn a_service_takes_up_an_edited_scene_where_deploy_is_asked_for_that() {
 #[test]
 fn what_no_service_could_follow_is_refused_before_there_is_an_archive() {
     let place = prepared();
-    let mut table: Table = workbench().parse().expect("a workbench");
-    let monitoring = table["monitoring"].as_table_mut().expect("a table");
-    monitoring.insert("enabled".to_owned(), true.into());
-    monitoring.insert("record".to_owned(), "/var/lib/taut/session.rrd".into());
-    place.write("workbench.toml", &table.to_string());
-    let (code, said) = deploy(&place, &["--follow-scene"]);
-    assert_eq!(code, Some(2), "{said}");
+    with_change(&place, |table| {
+        let monitoring = table["monitoring"].as_table_mut().expect("a table");
+        monitoring.insert("enabled".to_owned(), true.into());
+        monitoring.insert("record".to_owned(), "/var/lib/taut/session.rrd".into());
+    });
+    let said = refused(&place, &["--follow-scene"]);
     assert!(
         said.contains("--follow-scene") && said.contains("[monitoring] record"),
         "{said}"
     );
     assert!(!place.path("out").exists());
-    assert_eq!(deploy(&place, &[]).0, Some(0), "without it all is well");
+    deployed(&place, &[]); // without it all is well
 }
 
 #[test]
 fn recordings_of_the_page_go_where_the_service_may_write() {
     let place = prepared();
-    place.write("operator.token", "0123456789abcdef0123456789abcdef\n");
-    let token = place.path("operator.token");
-    fs::set_permissions(&token, fs::Permissions::from_mode(0o600)).expect("mine");
+    write_secret(&place, "operator.token", &"0123456789abcdef".repeat(2));
     for (recordings, is_good) in [
         ("recordings", false),
         ("/srv/recordings", false),
         ("/var/lib/taut/recordings", true),
     ] {
-        let mut table: Table = workbench().parse().expect("a workbench");
-        let operator = table["operator"].as_table_mut().expect("a table");
-        operator.insert("enabled".to_owned(), true.into());
-        operator.insert("token_file".to_owned(), "operator.token".into());
-        operator.insert("recordings".to_owned(), recordings.into());
-        place.write("workbench.toml", &table.to_string());
+        with_change(&place, |table| {
+            let operator = table["operator"].as_table_mut().expect("a table");
+            operator.insert("enabled".to_owned(), true.into());
+            operator.insert("token_file".to_owned(), "operator.token".into());
+            operator.insert("recordings".to_owned(), recordings.into());
+        });
         let (code, said) = deploy(&place, &[]);
         assert_eq!(code == Some(0), is_good, "{recordings}: {said}");
         let why = "`recordings` in [operator]";

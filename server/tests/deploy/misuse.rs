@@ -7,14 +7,13 @@ use super::*;
 fn names_with_signs_are_words_of_the_scripts_and_units() {
     let place = prepared();
     let node = "100%i $HOME 'x' \"`y`";
-    let mut table: Table = workbench().parse().expect("a workbench");
-    table["node"][0]["name"] = node.into();
-    table["machine"][1]["nodes"] = vec![node].into();
-    let name = "a\ntouch made; `touch made`; $(touch made) \"";
-    table.insert("name".to_owned(), name.into());
-    place.write("workbench.toml", &table.to_string());
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(0), "{said}");
+    with_change(&place, |table| {
+        table["node"][0]["name"] = node.into();
+        table["machine"][1]["nodes"] = vec![node].into();
+        let name = "a\ntouch made; `touch made`; $(touch made) \"";
+        table.insert("name".to_owned(), name.into());
+    });
+    let said = deployed(&place, &[]);
     let folder = unpacked(&place, "left");
     let key = "render-100_i__HOME__x____y_";
     assert!(folder.join(format!("etc/{key}.key")).is_file(), "{said}");
@@ -40,11 +39,10 @@ fn names_with_signs_are_words_of_the_scripts_and_units() {
 fn a_line_break_in_the_text_of_a_device_is_refused() {
     let place = prepared();
     let device = "simulated\nUser=root";
-    let mut table: Table = workbench().parse().expect("a workbench");
-    table["machine"][3]["device"] = device.into();
-    place.write("workbench.toml", &table.to_string());
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(2), "{said}");
+    with_change(&place, |table| {
+        table["machine"][3]["device"] = device.into();
+    });
+    let said = refused(&place, &[]);
     let why = format!("`taut bridge`: {device:?} has a control character");
     assert!(said.contains(&why), "{said}");
     assert!(!place.path("out").exists(), "{said}");
@@ -53,13 +51,12 @@ fn a_line_break_in_the_text_of_a_device_is_refused() {
 #[test]
 fn two_screens_of_one_machine_are_two_services_with_a_credential_each() {
     let place = prepared();
-    let mut table: Table = workbench().parse().expect("a workbench");
-    table["machine"][1]["nodes"] = vec!["front", "table"].into();
-    let machines = table["machine"].as_array_mut().expect("machines");
-    assert_eq!(machines.remove(2)["name"].as_str(), Some("right"));
-    place.write("workbench.toml", &table.to_string());
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(0), "{said}");
+    with_change(&place, |table| {
+        table["machine"][1]["nodes"] = vec!["front", "table"].into();
+        let machines = table["machine"].as_array_mut().expect("machines");
+        assert_eq!(machines.remove(2)["name"].as_str(), Some("right"));
+    });
+    deployed(&place, &[]);
     let folder = unpacked(&place, "left");
     for node in ["front", "table"] {
         let command = command(&folder, &format!("taut-render-{node}.service")).join(" ");
@@ -95,12 +92,12 @@ fn a_folder_that_cannot_be_had_is_named_and_nothing_is_half_written() {
 #[test]
 fn the_archive_of_a_machine_that_is_gone_is_named() {
     let place = prepared();
-    let (code, said) = deploy(&place, &[]);
-    assert!(code == Some(0) && !said.contains("remove it"), "{said}");
-    let renamed = workbench_text(&place).replace("\"right\"", "\"table-pc\"");
-    place.write("workbench.toml", &renamed);
-    let (code, said) = deploy(&place, &["--force"]);
-    assert_eq!(code, Some(0), "{said}");
+    let said = deployed(&place, &[]);
+    assert!(!said.contains("remove it"), "{said}");
+    with_change(&place, |table| {
+        table["machine"][2]["name"] = "table-pc".into();
+    });
+    let said = deployed(&place, &["--force"]);
     let gone = place.text("out/taut-right.tar.gz");
     let named = said.lines().filter(|line| line.contains("remove it"));
     let named: Vec<&str> = named.collect();
@@ -108,10 +105,6 @@ fn the_archive_of_a_machine_that_is_gone_is_named() {
         matches!(named[..], [line] if line.starts_with(&gone)),
         "{said}"
     );
-}
-
-fn workbench_text(place: &Workplace) -> String {
-    fs::read_to_string(place.path("workbench.toml")).expect("written")
 }
 
 /// A folder that others may look into does not open the archives to them.
@@ -122,7 +115,7 @@ fn archives_are_readable_by_their_owner_alone() {
     fs::create_dir(place.path("out")).expect("a folder");
     fs::set_permissions(place.path("out"), open).expect("its mode");
     for more in [&[][..], &["--issue", "2", "--force"]] {
-        assert_eq!(deploy(&place, more).0, Some(0));
+        deployed(&place, more);
         let there = files(&place.path("out"));
         assert_eq!(there.len(), 4, "{there:?}");
         for file in there {
@@ -137,15 +130,11 @@ fn the_operators_token_travels_with_the_server_alone() {
     let place = prepared();
     let with = |more: &str| format!("{}\n[operator]\nenabled = true\n{more}", without_operator());
     place.write("workbench.toml", &with(""));
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(2), "{said}");
+    let said = refused(&place, &[]);
     assert!(said.contains("openssl rand"), "{said}");
-    let token = place.path("operator.token");
-    fs::write(&token, "0123456789abcdef".repeat(4)).expect("a token");
-    fs::set_permissions(&token, fs::Permissions::from_mode(0o600)).expect("its mode");
+    write_secret(&place, "operator.token", &"0123456789abcdef".repeat(4));
     place.write("workbench.toml", &with("token_file = \"operator.token\""));
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(0), "{said}");
+    deployed(&place, &[]);
     let carried = unpacked(&place, "haptic-pc").join("etc/operator.token");
     let mode = fs::metadata(&carried)
         .expect("carried")
@@ -163,12 +152,12 @@ fn an_old_cluster_key_is_not_written_over_the_new_one() {
     let (old, new) = (place.path("cluster.key"), place.text("new.key"));
     assert!(taut(&["keys", "--out", &new]).status.success());
     let deployed = |also: &str| {
-        let mut table: Table = workbench().parse().expect("a workbench");
-        let network = table["network"].as_table_mut().expect("a table");
-        network.insert("also_key".to_owned(), also.into());
-        let until = "2100-01-01T00:00:00Z";
-        network.insert("also_key_until".to_owned(), until.into());
-        place.write("workbench.toml", &table.to_string());
+        with_change(&place, |table| {
+            let network = table["network"].as_table_mut().expect("a table");
+            network.insert("also_key".to_owned(), also.into());
+            let until = "2100-01-01T00:00:00Z";
+            network.insert("also_key_until".to_owned(), until.into());
+        });
         let (config, out) = (place.text("workbench.toml"), place.text("out"));
         let output = taut(&["deploy", &config, "--master", &new, "--out", &out]);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -196,11 +185,8 @@ fn a_token_called_as_a_credential_of_a_screen_is_the_service_s() {
     let operator = format!("[operator]\nenabled = true\ntoken_file = \"{name}\"\n");
     let text = format!("{}\n{operator}", without_operator());
     place.write("workbench.toml", &text);
-    place.write(name, &"0123456789abcdef".repeat(4));
-    let own = fs::Permissions::from_mode(0o600);
-    fs::set_permissions(place.path(name), own).expect("its mode");
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(0), "{said}");
+    write_secret(&place, name, &"0123456789abcdef".repeat(4));
+    deployed(&place, &[]);
     let folder = unpacked(&place, "haptic-pc");
     let script = |name: &str| fs::read_to_string(folder.join(name)).expect("a script");
     let line = format!("install -D -m 0600 -o taut -g taut etc/{name} /etc/taut/{name}");

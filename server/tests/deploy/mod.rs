@@ -83,6 +83,34 @@ fn deploy(place: &Workplace, more: &[&str]) -> (Option<i32>, String) {
     (output.status.code(), said)
 }
 
+/// The same of what is good: what it says.
+fn deployed(place: &Workplace, more: &[&str]) -> String {
+    let (code, said) = deploy(place, more);
+    assert_eq!(code, Some(0), "{said}");
+    said
+}
+
+/// And of what is not.
+fn refused(place: &Workplace, more: &[&str]) -> String {
+    let (code, said) = deploy(place, more);
+    assert_eq!(code, Some(2), "{said}");
+    said
+}
+
+/// Writes the workbench file with a change of this.
+fn with_change(place: &Workplace, change: impl FnOnce(&mut Table)) {
+    let mut table: Table = workbench().parse().expect("a workbench");
+    change(&mut table);
+    place.write("workbench.toml", &table.to_string());
+}
+
+/// A file that its owner alone may read.
+fn write_secret(place: &Workplace, name: &str, text: &str) {
+    place.write(name, text);
+    let own = fs::Permissions::from_mode(0o600);
+    fs::set_permissions(place.path(name), own).expect("its mode");
+}
+
 /// Unpacks a machine's archive as `tar xzf` does; the folder that it makes.
 fn unpacked(place: &Workplace, machine: &str) -> PathBuf {
     let name = format!("taut-{machine}");
@@ -127,8 +155,7 @@ fn command(folder: &Path, unit: &str) -> Vec<String> {
 #[test]
 fn each_machine_gets_its_own_secret_and_no_other() {
     let place = prepared();
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(0), "{said}");
+    deployed(&place, &[]);
     let keys = [
         ("haptic-pc", "cluster.key"),
         ("left", "render-front.key"),
@@ -180,7 +207,7 @@ fn each_machine_gets_its_own_secret_and_no_other() {
 #[test]
 fn a_second_run_changes_nothing_and_another_workbench_is_not_written_over_the_first() {
     let place = prepared();
-    assert_eq!(deploy(&place, &[]).0, Some(0));
+    deployed(&place, &[]);
     let all = || -> Vec<Vec<u8>> {
         let mut there = files(&place.path("out"));
         there.sort();
@@ -191,19 +218,17 @@ fn a_second_run_changes_nothing_and_another_workbench_is_not_written_over_the_fi
     };
     let first = all();
     assert_eq!(first.len(), 4);
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(0), "{said}");
+    let said = deployed(&place, &[]);
     assert!(said.contains("nothing was changed"), "{said}");
     let changed = workbench().replace("eye_separation = 0.064", "eye_separation = 0.06");
     place.write("workbench.toml", &changed);
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(2));
+    let said = refused(&place, &[]);
     assert!(
         said.contains("--force") && said.contains("haptic-pc"),
         "{said}"
     );
     assert!(all() == first, "something was written");
-    assert_eq!(deploy(&place, &["--force"]).0, Some(0));
+    deployed(&place, &["--force"]);
     assert!(all() != first);
     assert_eq!(all().len(), 4);
 }
@@ -236,8 +261,7 @@ fn a_workbench_with_faults_is_refused_with_its_lines_and_leaves_nothing() {
     ] {
         assert!(good.contains(from), "{from}");
         place.write("workbench.toml", &good.replace(from, to));
-        let (code, said) = deploy(&place, &[]);
-        assert_eq!(code, Some(2), "{to}: {said}");
+        let said = refused(&place, &[]);
         assert!(said.contains(part), "{part}: {said}");
         assert!(!place.path("out").exists(), "{to}");
     }
@@ -253,15 +277,14 @@ fn a_workbench_with_faults_is_refused_with_its_lines_and_leaves_nothing() {
     );
     let far = good.replace("scenes/mine.toml", &outside.text("mine.toml"));
     place.write("workbench.toml", &far);
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(2), "{said}");
+    let said = refused(&place, &[]);
     assert!(said.contains("not below"), "{said}");
 }
 
 #[test]
 fn processes_of_two_archives_join_each_other() {
     let place = prepared();
-    assert_eq!(deploy(&place, &[]).0, Some(0));
+    deployed(&place, &[]);
     let (haptic, device) = (unpacked(&place, "haptic-pc"), unpacked(&place, "device-pc"));
     let mut bridge = command(&device, "taut-bridge.service");
     bridge.push("--json".to_owned());
@@ -279,13 +302,10 @@ fn processes_of_two_archives_join_each_other() {
 #[test]
 fn files_of_screens_go_to_the_machine_that_draws_them_beside_its_credential() {
     let place = prepared();
-    let mut file: Table = workbench().parse().expect("a workbench");
-    let screens = file.get_mut("screen").and_then(Value::as_array_mut);
-    let screen = screens
-        .and_then(|list| list[0].as_table_mut())
-        .expect("a screen");
-    screen.insert("blend".to_owned(), "masks/front.pfm".into());
-    place.write("workbench.toml", &file.to_string());
+    with_change(&place, |table| {
+        let screen = table["screen"][0].as_table_mut().expect("a screen");
+        screen.insert("blend".to_owned(), "masks/front.pfm".into());
+    });
     let (code, said) = deploy(&place, &[]);
     assert!(code != Some(0) && said.contains("front.pfm"), "{said}");
     fs::create_dir(place.path("masks")).expect("a folder");
@@ -293,8 +313,7 @@ fn files_of_screens_go_to_the_machine_that_draws_them_beside_its_credential() {
     let light = 1.0_f32.to_le_bytes().repeat(1280 * 427);
     let mask = [b"Pf\n1280 427\n-1.0\n".as_slice(), &light].concat();
     fs::write(place.path("masks/front.pfm"), mask).expect("written");
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(0), "{said}");
+    deployed(&place, &[]);
     for (machine, has) in [("left", true), ("right", false), ("haptic-pc", true)] {
         let there = unpacked(&place, machine)
             .join("etc/masks/front.pfm")
@@ -323,8 +342,7 @@ fn what_meshes_are_read_with_is_in_the_archive_beside_them() {
         "bufferViews":[{"buffer":0,"byteLength":36}],
         "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[0.1,0.1,0]}]}"#;
     place.write("scenes/parts/Plate.GLTF", plate);
-    let (code, said) = deploy(&place, &[]);
-    assert_eq!(code, Some(0), "{said}");
+    deployed(&place, &[]);
     let etc = unpacked(&place, "haptic-pc").join("etc");
     for file in ["part.obj", "part.mtl", "Plate.GLTF", "plate.bin"] {
         assert!(etc.join("scenes/parts").join(file).is_file(), "{file}");
@@ -338,6 +356,5 @@ fn what_meshes_are_read_with_is_in_the_archive_beside_them() {
     );
     // Without a library a mesh is read all the same.
     fs::remove_file(place.path("scenes/parts/part.mtl")).expect("removed");
-    let (code, said) = deploy(&place, &["--force"]);
-    assert_eq!(code, Some(0), "{said}");
+    deployed(&place, &["--force"]);
 }
