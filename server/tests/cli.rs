@@ -1,21 +1,16 @@
 //! The program from outside: what bad input gives, and that nothing is left running or lying about.
 
-use std::net::UdpSocket;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use crate::support::{Running, Workplace, taut, workbench};
-
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
+use crate::support::{PATIENCE, Running, Workplace, free_address, refusal, taut, workbench};
 
 /// The command is refused with exit code 2 and one sentence that holds all of `parts`.
 fn refused<S: AsRef<std::ffi::OsStr>>(arguments: &[S], parts: &[&str]) {
     let begun = Instant::now();
     let output = taut(arguments);
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{error}");
+    let error = refusal(&output);
     assert!(begun.elapsed() < PATIENCE, "took {:?}", begun.elapsed());
     assert!(error.starts_with("taut: "), "{error}");
     assert_eq!(error.trim_end().lines().count(), 1, "{error}");
@@ -267,10 +262,7 @@ fn assert_whole(report: &serde_json::Value) {
 #[test]
 fn a_session_is_served_recorded_and_ended_by_a_signal() {
     let place = Workplace::new();
-    let free = UdpSocket::bind(("127.0.0.1", 0))
-        .and_then(|socket| socket.local_addr())
-        .expect("no port");
-    let address = free.to_string();
+    let address = free_address();
     let server = Running::start(&place.serve("workbench.toml", "60", &["--quic", &address]));
 
     // A client with another key is refused, and disturbs nobody.
@@ -325,16 +317,13 @@ fn import_makes_a_scene_or_says_what_to_write() {
         &["part.obj", "--unit mm (0.0300 m)"],
     );
     assert!(!place.path("out").exists());
-    let unknown = taut(&["import", &part, "--out", &out, "--unit", "feet"]);
-    assert_eq!(unknown.status.code(), Some(2));
-    let error = String::from_utf8_lossy(&unknown.stderr).into_owned();
+    let error = refusal(&taut(&["import", &part, "--out", &out, "--unit", "feet"]));
     assert!(
         error.contains("write one of m, dm, cm, mm, um, inch"),
         "{error}"
     );
     for option in ["--thicken", "--simplify"] {
-        let negative = taut(&["import", &part, "--out", &out, option, "-1"]);
-        let error = String::from_utf8_lossy(&negative.stderr).into_owned();
+        let error = refusal(&taut(&["import", &part, "--out", &out, option, "-1"]));
         assert!(
             error.contains(option) && error.contains("metres"),
             "{error}"
@@ -454,9 +443,8 @@ fn a_preview_that_cannot_be_is_refused_before_anything_is_written() {
         &["there is no folder", "--out"],
     );
     let usage = |arguments: &[&str], expected: &str| {
-        let output = taut(&[&["preview", "peg-in-a-hole", "--out"], arguments].concat());
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{error}");
+        let words = [&["preview", "peg-in-a-hole", "--out"], arguments].concat();
+        let error = refusal(&taut(&words));
         assert!(error.contains(expected), "{error}");
     };
     usage(&["picture.jpg"], "ends in .png");

@@ -4,7 +4,9 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use crate::support::{MachineWatch, PATIENCE, shipped_workbench, start_behind_relay, start_bridge};
+use crate::support::{
+    MachineWatch, PATIENCE, no_monitor, shipped_workbench, start_behind_relay, start_bridge,
+};
 use taut::session::setup::DeviceSource;
 use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::{BridgeReport, DeviceLimits, MAX_EDGE_DELAY};
@@ -56,8 +58,7 @@ fn run(coupling: &str) -> Run {
     let workbench = shipped_workbench(&["device={kind=\"remote\"}"]);
     let overrides = Overrides {
         scene: scene.to_str().map(str::to_owned),
-        no_monitor: true,
-        ..Overrides::default()
+        ..no_monitor()
     };
     let mut setup =
         session_setup(&workbench, key, &overrides).unwrap_or_else(|error| panic!("{error}"));

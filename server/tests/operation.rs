@@ -6,7 +6,9 @@ use std::os::unix::net::UnixDatagram;
 use std::path::Path;
 use std::time::Duration;
 
-use crate::support::{PATIENCE, Running, Workplace, command, signal, wait_until, workbench};
+use crate::support::{
+    PATIENCE, Running, Workplace, command, free_address, signal, wait_until, workbench,
+};
 use taut_link::proto::control::LogLevel;
 use taut_link::{
     ClientOptions, ClusterKey, JoinKey, Role, Transport, connect, create_key_file, read_key_file,
@@ -155,21 +157,30 @@ fn hear(manager: &UnixDatagram) -> String {
     String::from_utf8_lossy(&bytes[..length]).into_owned()
 }
 
+/// A server of a service manager that has heard that it is ready, beside that manager.
+fn managed(place: &Workplace, more: &[&str]) -> (UnixDatagram, Running) {
+    let path = place.path("notify");
+    let manager = manager(&path);
+    let socket = ("NOTIFY_SOCKET", path.to_str().expect("a path"));
+    let server = serve(place, more, &[socket, ("WATCHDOG_USEC", "2000000")]);
+    assert!(hear(&manager).contains("READY=1"));
+    (manager, server)
+}
+
+fn assert_it_says_that_it_stops(manager: &UnixDatagram, server: Running) {
+    server.signal("-TERM");
+    wait_until("it says that it stops", || {
+        hear(manager).contains("STOPPING=1")
+    });
+    let ended = server.ended();
+    assert!(ended.status.success(), "{ended:?}");
+}
+
 #[test]
 fn a_service_manager_hears_ready_then_signs_of_life_then_stopping() {
     let place = Workplace::new();
-    let path = place.path("notify");
-    let manager = manager(&path);
+    let (manager, server) = managed(&place, &[]);
     let hear = || hear(&manager);
-    let server = serve(
-        &place,
-        &[],
-        &[
-            ("NOTIFY_SOCKET", path.to_str().expect("a path")),
-            ("WATCHDOG_USEC", "2000000"),
-        ],
-    );
-    assert!(hear().contains("READY=1"));
     assert!(hear().contains("WATCHDOG=1"));
     // A process that stands sends none: what came before is read until it is quiet.
     server.signal("-STOP");
@@ -181,28 +192,15 @@ fn a_service_manager_hears_ready_then_signs_of_life_then_stopping() {
     server.signal("-CONT");
     manager.set_read_timeout(Some(PATIENCE)).expect("a socket");
     assert!(hear().contains("WATCHDOG=1"), "it goes on");
-    server.signal("-TERM");
-    wait_until("it says that it stops", || hear().contains("STOPPING=1"));
-    let ended = server.ended();
-    assert!(ended.status.success(), "{ended:?}");
+    assert_it_says_that_it_stops(&manager, server);
 }
 
 /// A manager that hears of a stop ends the process soon after, whatever runs in it by then.
 #[test]
 fn another_scene_is_no_stop_to_a_service_manager() {
     let place = Workplace::new();
-    let path = place.path("notify");
-    let manager = manager(&path);
+    let (manager, server) = managed(&place, &["--follow-scene"]);
     let hear = || hear(&manager);
-    let server = serve(
-        &place,
-        &["--follow-scene"],
-        &[
-            ("NOTIFY_SOCKET", path.to_str().expect("a path")),
-            ("WATCHDOG_USEC", "2000000"),
-        ],
-    );
-    assert!(hear().contains("READY=1"));
     let other = workbench().replace("\"sphere-on-plane\"", "\"peg-in-a-hole\"");
     place.write("workbench.toml", &other);
     let mut heard = String::new();
@@ -215,10 +213,7 @@ fn another_scene_is_no_stop_to_a_service_manager() {
     let between = heard.find("WATCHDOG_USEC=120000000");
     let again = heard.rfind("WATCHDOG_USEC=2000000");
     assert!(between.is_some() && between < again, "{heard}");
-    server.signal("-TERM");
-    wait_until("it says that it stops", || hear().contains("STOPPING=1"));
-    let ended = server.ended();
-    assert!(ended.status.success(), "{ended:?}");
+    assert_it_says_that_it_stops(&manager, server);
 }
 
 /// A client's part of the same: it is ready while it waits for a server that is not there, alive, and stops when it is told to.
@@ -276,8 +271,7 @@ fn metrics_that_find_no_room_are_told_of_once_and_end_nothing() {
 fn a_terminal_that_stands_costs_lines_and_no_time() {
     let place = Workplace::new();
     // Everything is logged, to a pipe of 64 KiB that nobody reads.
-    let free = UdpSocket::bind(("127.0.0.1", 0)).and_then(|socket| socket.local_addr());
-    let quic = free.expect("a port").to_string();
+    let quic = free_address();
     let options = [
         "--quic",
         quic.as_str(),

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{PATIENCE, Running, Workplace, taut, wait_until, workbench};
+use crate::support::{PATIENCE, Running, Workplace, refusal, taut, wait_until, workbench};
 
 pub(crate) const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 /// A force that is one, N.
@@ -112,10 +112,14 @@ impl Served {
         format!("Host: {}\r\n", self.address)
     }
 
-    /// What the page itself sends with a deed.
+    /// What a program beside the page sends with a deed.
+    pub(crate) fn with_token(&self) -> String {
+        self.host() + &bearer(TOKEN) + "Content-Length: 0\r\n"
+    }
+
+    /// What the page itself sends.
     fn shown(&self) -> String {
-        let origin = format!("Origin: http://{}\r\n", self.address);
-        self.host() + &origin + &bearer(TOKEN) + "Content-Length: 0\r\n"
+        format!("Origin: http://{}\r\n", self.address) + &self.with_token()
     }
 
     pub(crate) fn status(&self) -> Option<Value> {
@@ -204,8 +208,11 @@ fn the_token_arms_and_disarms_and_who_has_none_is_refused_and_audited() {
     // A program with the token, beside the page, and beside many who connect and say nothing.
     let connect = |_| TcpStream::connect(&served.address).expect("the page's port");
     let _silent: Vec<TcpStream> = (0..100).map(connect).collect();
-    let program = served.host() + &bearer(TOKEN);
-    does("POST /disarm", &program, "disarmed: the force fades");
+    does(
+        "POST /disarm",
+        &served.with_token(),
+        "disarmed: the force fades",
+    );
     served.wait_for_run("paused");
     wait_until("the hand feels nothing", || served.now("force_n") == 0.0);
     wait_until("disarming is audited", || {
@@ -318,11 +325,7 @@ fn arming_is_refused_where_taut_arm_is_and_disarming_is_not() {
 
 #[test]
 fn a_token_that_others_know_or_may_read_does_not_start() {
-    let refusal = |place: &Workplace| {
-        let output = taut(&place.serve("workbench.toml", "1", &[]));
-        assert_eq!(output.status.code(), Some(2));
-        String::from_utf8_lossy(&output.stderr).into_owned()
-    };
+    let refusal = |place: &Workplace| refusal(&taut(&place.serve("workbench.toml", "1", &[])));
     let place = Workplace::new();
     // A fresh token would go to a file or a journal.
     place.write("workbench.toml", &with_page());
@@ -369,9 +372,8 @@ fn a_page_whose_port_is_taken_leaves_no_recording() {
         if was_there {
             std::fs::create_dir(&recording).expect("made");
         }
-        let output = taut(&place.serve("workbench.toml", "1", &["--recording", &named]));
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
+        let serve = place.serve("workbench.toml", "1", &["--recording", &named]);
+        let said = refusal(&taut(&serve));
         assert!(said.contains("[operator] cannot listen"), "{said}");
         let left = std::fs::read_dir(&recording).map(Iterator::count).ok();
         assert_eq!(left, was_there.then_some(0), "{said}");

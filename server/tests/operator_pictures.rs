@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use taut_link::{ClientLink, ClientOptions, Role, Shown, ShownPicture, connect, read_key_file};
 
-use crate::operator::{Served, TOKEN, with_token_file};
+use crate::operator::{Served, with_token_file};
 use crate::support::{PATIENCE, Workplace, wait_until};
 
 /// A picture of these pixels.
@@ -92,13 +92,6 @@ impl Drop for Node {
 }
 
 impl Served {
-    fn with_token(&self) -> String {
-        format!(
-            "{}Authorization: Bearer {TOKEN}\r\nContent-Length: 0\r\n",
-            self.host()
-        )
-    }
-
     /// The newest pictures and what is missing, once it is time for them.
     fn lot(&self) -> Value {
         let begun = Instant::now();

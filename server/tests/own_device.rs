@@ -7,7 +7,7 @@ use taut_bridge::Hand;
 use taut_bridge::haply::{HaplyService, SimulatedInverse, SimulatedSettings};
 use taut_link::{ClientOptions, Role, connect, read_key_file};
 
-use crate::support::{PATIENCE, Running, Workplace, taut, workbench};
+use crate::support::{PATIENCE, Running, Workplace, refusal, taut, workbench};
 
 /// Where the scene stands, so that its ball begins at the workbench's origin: three times as large as it is, at (0.05, 0, 0.04) m of its own.
 const STANDS: &str = "position = [-0.15, 0.0, -0.12]";
@@ -91,9 +91,8 @@ fn a_haply_arm_is_opened_by_the_server_itself() {
 fn what_cannot_be_is_refused_by_name() {
     let place = Workplace::new();
     place.write("workbench.toml", &with_device("kind = \"haply\""));
-    let output = taut(&place.serve("workbench.toml", "1", &["--follow-scene"]));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    let following = place.serve("workbench.toml", "1", &["--follow-scene"]);
+    let said = refusal(&taut(&following));
     assert!(
         said.contains("--follow-scene") && said.contains("kind = \"remote\""),
         "{said}"
@@ -104,9 +103,7 @@ fn what_cannot_be_is_refused_by_name() {
         .replace("[monitoring]", "[monitoring]\nrecord = \"all.rrd\"");
     assert!(record.contains("all.rrd"));
     place.write("workbench.toml", &record);
-    let output = taut(&place.serve("workbench.toml", "1", &["--follow-scene"]));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    let said = refusal(&taut(&following));
     assert!(said.contains("[monitoring] record"), "{said}");
 
     // With its line, before anything is opened.
@@ -127,9 +124,7 @@ fn what_cannot_be_is_refused_by_name() {
         "workbench.toml",
         &with_device("kind = \"python\"\nfile = \"none.py\""),
     );
-    let output = taut(&place.serve("workbench.toml", "1", &[]));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    let said = refusal(&taut(&place.serve("workbench.toml", "1", &[])));
     assert!(
         said.contains("none.py") && said.contains("write its whole path"),
         "{said}"

@@ -1,12 +1,13 @@
 //! `taut record` beside servers that stop, are killed and come back.
 
-use std::net::UdpSocket;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use taut_bridge::signals::is_ignored;
 
-use crate::support::{PATIENCE, Running, Workplace, taut, wait_until, workbench};
+use crate::support::{
+    PATIENCE, Running, Workplace, free_address, refusal, taut, wait_until, workbench,
+};
 
 /// Times of the rows of a trace, s.
 fn times(trace: &Path) -> Vec<f64> {
@@ -16,24 +17,29 @@ fn times(trace: &Path) -> Vec<f64> {
         .collect()
 }
 
+/// Where this recorder writes until it is done.
+fn partial(place: &Workplace, name: &str, recorder: u32) -> PathBuf {
+    place.path(&format!(".{name}.{recorder}.partial"))
+}
+
+/// Waits for more than this in the file. Rows go through a buffer, so that there are some hundreds when it was written the first time.
+fn wait_for_more(than: u64, partial: &Path) {
+    wait_until("no rows", || {
+        std::fs::metadata(partial).is_ok_and(|file| file.len() > than)
+    });
+}
+
 #[test]
 fn a_recording_goes_on_when_its_server_was_killed_and_comes_back() {
     let place = Workplace::new();
-    let free = || match UdpSocket::bind(("127.0.0.1", 0)).and_then(|socket| socket.local_addr()) {
-        Ok(address) => address.to_string(),
-        Err(error) => panic!("no port: {error}"),
-    };
-    let (address, out) = (free(), place.text("trace.csv"));
+    let (address, out) = (free_address(), place.text("trace.csv"));
     let serve = place.serve("workbench.toml", "120", &["--quic", &address]);
     let first = Running::start(&serve);
     wait_until("no server", || first.says("serving on"));
     let key = place.text("cluster.key");
     let recorder = Running::start(&["record", "--server", &address, "--key", &key, "--out", &out]);
-    // Rows go through a buffer, so that there are some hundreds when it was written the first time.
-    let partial = place.path(&format!(".trace.csv.{}.partial", recorder.id()));
-    wait_until("no rows", || {
-        std::fs::metadata(&partial).is_ok_and(|file| file.len() > 0)
-    });
+    let partial = partial(&place, "trace.csv", recorder.id());
+    wait_for_more(0, &partial);
 
     drop(first); // killed
     let second = Running::start(&serve);
@@ -42,9 +48,7 @@ fn a_recording_goes_on_when_its_server_was_killed_and_comes_back() {
         recorder.says("joined again; the trace has a gap")
     });
     let before = std::fs::metadata(&partial).map_or(0, |file| file.len());
-    wait_until("no more rows", || {
-        std::fs::metadata(&partial).is_ok_and(|file| file.len() > before)
-    });
+    wait_for_more(before, &partial);
 
     assert!(recorder.end("-INT").status.success());
     let times = times(&place.path("trace.csv"));
@@ -61,10 +65,7 @@ fn a_recording_goes_on_when_its_server_was_killed_and_comes_back() {
 #[test]
 fn a_recording_ends_with_the_server_that_stops_unless_told_to_stay() {
     let place = Workplace::new();
-    let free = UdpSocket::bind(("127.0.0.1", 0))
-        .and_then(|socket| socket.local_addr())
-        .expect("no port");
-    let (address, key) = (free.to_string(), place.text("cluster.key"));
+    let (address, key) = (free_address(), place.text("cluster.key"));
     // Nobody is there yet: who stays waits.
     let record = |out: &str, more: &[&str]| {
         let out = place.text(out);
@@ -76,13 +77,8 @@ fn a_recording_ends_with_the_server_that_stops_unless_told_to_stay() {
     let server = Running::start(&serve);
     wait_until("no server", || server.says("serving on"));
     let leaving = record("leaving.csv", &[]);
-    let partial =
-        |name: &str, child: &Running| place.path(&format!(".{name}.{}.partial", child.id()));
     for (name, child) in [("staying.csv", &staying), ("leaving.csv", &leaving)] {
-        let partial = partial(name, child);
-        wait_until(name, || {
-            std::fs::metadata(&partial).is_ok_and(|file| file.len() > 0)
-        });
+        wait_for_more(0, &partial(&place, name, child.id()));
     }
     server.signal("-TERM");
     assert!(leaving.ended().status.success());
@@ -104,10 +100,7 @@ fn the_duration_of_a_recording_ends_where_the_device_is_silent_too() {
         .replacen("tremor = ", "# tremor = ", 1)
         .replacen("seed = ", "# seed = ", 1);
     place.write("workbench.toml", &silent);
-    let free = UdpSocket::bind(("127.0.0.1", 0))
-        .and_then(|socket| socket.local_addr())
-        .expect("no port");
-    let (address, key) = (free.to_string(), place.text("cluster.key"));
+    let (address, key) = (free_address(), place.text("cluster.key"));
     let out = place.text("trace.csv");
     let _server = Running::start(&place.serve("workbench.toml", "120", &["--quic", &address]));
     let record = ["record", "--server", &address, "--key", &key, "--out", &out];
@@ -119,18 +112,13 @@ fn the_duration_of_a_recording_ends_where_the_device_is_silent_too() {
 #[test]
 fn a_trace_that_is_there_is_not_written_over() {
     let place = Workplace::new();
-    let free = UdpSocket::bind(("127.0.0.1", 0))
-        .and_then(|socket| socket.local_addr())
-        .expect("no port");
-    let (address, key) = (free.to_string(), place.text("cluster.key"));
+    let (address, key) = (free_address(), place.text("cluster.key"));
     let out = place.text("trace.csv");
     place.write("trace.csv", "precious");
     let record = ["record", "--server", &address, "--key", &key, "--out", &out];
     let record = [&record[..], &["--stay"]].concat();
     // Nobody is there, and nobody is waited for.
-    let refused = taut(&record);
-    let said = String::from_utf8_lossy(&refused.stderr);
-    assert_eq!(refused.status.code(), Some(2), "{said}");
+    let said = refusal(&taut(&record));
     assert!(said.contains("trace.csv is there already"), "{said}");
 
     let _server = Running::start(&place.serve("workbench.toml", "120", &["--quic", &address]));
@@ -143,10 +131,7 @@ fn a_trace_that_is_there_is_not_written_over() {
 
     // A terminal that is gone ends it as Ctrl-C does.
     let recorder = Running::start(&numbered);
-    let partial = place.path(&format!(".trace-3.csv.{}.partial", recorder.id()));
-    wait_until("no rows", || {
-        std::fs::metadata(&partial).is_ok_and(|file| file.len() > 0)
-    });
+    wait_for_more(0, &partial(&place, "trace-3.csv", recorder.id()));
     let signal = if is_ignored(libc::SIGHUP) {
         "-INT"
     } else {
@@ -161,10 +146,7 @@ fn a_trace_that_is_there_is_not_written_over() {
 #[test]
 fn what_was_recorded_until_the_disk_was_full_is_kept_and_named() {
     let place = Workplace::new();
-    let free = UdpSocket::bind(("127.0.0.1", 0))
-        .and_then(|socket| socket.local_addr())
-        .expect("no port");
-    let (address, key) = (free.to_string(), place.text("cluster.key"));
+    let (address, key) = (free_address(), place.text("cluster.key"));
     let _server = Running::start(&place.serve("workbench.toml", "120", &["--quic", &address]));
     let script = "trap '' XFSZ; ulimit -f 16; exec \"$0\" \"$@\"";
     let out = place.text("trace.csv");
@@ -176,10 +158,8 @@ fn what_was_recorded_until_the_disk_was_full_is_kept_and_named() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("a shell");
-    let partial = place.path(&format!(".trace.csv.{}.partial", recorder.id()));
-    let ended = recorder.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&ended.stderr);
-    assert_eq!(ended.status.code(), Some(2), "{said}");
+    let partial = partial(&place, "trace.csv", recorder.id());
+    let said = refusal(&recorder.wait_with_output().expect("it ends"));
     let named = format!("what could be is in {}", partial.display());
     assert!(said.contains(&named), "{said}");
     assert!(times(&partial).len() > 10, "{said}");

@@ -12,7 +12,7 @@ use taut::shared::failure::Failure;
 use taut::shared::shutdown::Shutdown;
 use taut_link::ClusterKey;
 
-use crate::support::{PATIENCE, Workplace, shipped_workbench, taut};
+use crate::support::{PATIENCE, Workplace, no_monitor, refusal, shipped_workbench, taut};
 
 /// How long a session runs at least: the simulated hand touches before.
 const RUN: Duration = Duration::from_millis(2500);
@@ -21,18 +21,19 @@ const ATTEMPTS: u32 = 5;
 /// Updates that a recording must hold to be worth something.
 const UPDATES: u64 = 200;
 
-fn record(scene: &str, directory: &Path) {
-    let workbench = shipped_workbench(&[]);
+/// A session of this scene that is recorded here.
+fn started(scene: &str, directory: &Path) -> Result<Session, Failure> {
     let key = ClusterKey::generate().expect("no random numbers");
     let overrides = Overrides {
         scene: Some(scene.to_owned()),
-        no_monitor: true,
         recording: Some(directory.to_path_buf()),
-        ..Overrides::default()
+        ..no_monitor()
     };
-    let session = session_setup(&workbench, key, &overrides)
-        .and_then(Session::start)
-        .unwrap_or_else(|error| panic!("{error}"));
+    session_setup(&shipped_workbench(&[]), key, &overrides).and_then(Session::start)
+}
+
+fn record(scene: &str, directory: &Path) {
+    let session = started(scene, directory).unwrap_or_else(|error| panic!("{error}"));
     let begun = Instant::now();
     // The recorder writes to the files while it records: a busy machine may take longer for as many rows.
     let rows = |name: &str| {
@@ -50,6 +51,20 @@ fn record(scene: &str, directory: &Path) {
 
 fn again(directory: &Path) -> Result<RecordedReport, Failure> {
     recorded::run(directory, None, false, &Shutdown::default())
+}
+
+/// What is left of a recording of which record 50 is missing.
+fn assert_a_gap(directory: &Path, compared: impl Fn(&RecordedReport) -> u64) {
+    let report = again(directory).unwrap_or_else(|error| panic!("{error}"));
+    assert!(compared(&report) <= 49, "{report}");
+    assert_eq!(report.first_difference, None);
+    assert!(report.gap.is_some_and(|gap| gap.contains("not whole")));
+}
+
+/// Why it is not computed at all.
+fn refused(directory: &Path) -> String {
+    let refused = again(directory).map(|report| report.to_string());
+    refused.expect_err("computed").to_string()
 }
 
 /// The report of `taut export` into this file.
@@ -86,10 +101,8 @@ fn a_recorded_session_is_computed_again_bit_by_bit() {
         let mut attempts = (0..ATTEMPTS).map(|attempt| {
             let recording = directory.path().join(format!("{scene}-{attempt}"));
             record(scene, &recording);
-            match recorded::run(&recording, Some(&out), false, &Shutdown::default()) {
-                Ok(report) => (report, recording),
-                Err(error) => panic!("{error}"),
-            }
+            let report = recorded::run(&recording, Some(&out), false, &Shutdown::default());
+            (report.unwrap_or_else(|error| panic!("{error}")), recording)
         });
         let Some((report, recording)) = attempts.find(|(report, _)| report.complete) else {
             panic!("{scene}: no recording is whole");
@@ -134,18 +147,13 @@ fn a_recording_that_was_changed_is_found_out() {
         let cut = trimmed.rfind(',').unwrap_or(0);
         format!("{},0.125\n", &trimmed[..cut])
     });
-    match again(&path) {
-        Ok(report) => {
-            assert_eq!(report.different_updates, 1);
-            let difference = report.first_difference.unwrap_or_default();
-            assert!(
-                difference.contains(&format!("update {last}:"))
-                    && difference.contains("gap 1.25e-1"),
-                "{difference}"
-            );
-        }
-        Err(error) => panic!("{error}"),
-    }
+    let report = again(&path).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(report.different_updates, 1);
+    let difference = report.first_difference.unwrap_or_default();
+    assert!(
+        difference.contains(&format!("update {last}:")) && difference.contains("gap 1.25e-1"),
+        "{difference}"
+    );
 
     // An update that is missing, of a recording that says that it is whole, and of one that does not: the last was killed, and its last line is cut.
     let manifest = path.join("recording.json");
@@ -157,34 +165,18 @@ fn a_recording_that_was_changed_is_found_out() {
     };
     say_complete(true);
     replaced(&updates, |text| without_record(&text, 50));
-    match again(&path) {
-        Err(error) => assert!(error.to_string().contains("not whole"), "{error}"),
-        Ok(report) => panic!("{report}"),
-    }
+    assert!(refused(&path).contains("not whole"));
     say_complete(false);
     replaced(&path.join("forces.csv"), |text| {
         text[..text.len() - 30].to_owned()
     });
-    match again(&path) {
-        Ok(report) => {
-            assert!(report.updates <= 49, "{report}");
-            assert_eq!(report.first_difference, None);
-            assert!(report.gap.is_some_and(|gap| gap.contains("not whole")));
-        }
-        Err(error) => panic!("{error}"),
-    }
+    assert_a_gap(&path, |report| report.updates);
 
     // Another stiffness.
     replaced(&path.join("scene.toml"), |text| {
         text.replace("k_h = 1000.0", "k_h = 2000.0")
     });
-    match again(&path) {
-        Err(error) => assert!(
-            error.to_string().contains("other bodies or settings"),
-            "{error}"
-        ),
-        Ok(report) => panic!("{report}"),
-    }
+    assert!(refused(&path).contains("other bodies or settings"));
 
     // What does not rest on the scene is exported all the same.
     let export = exported(&path, &directory.path().join("changed.mcap"));
@@ -203,14 +195,7 @@ fn a_lost_force_is_a_gap_and_what_is_behind_it_is_not_compared() {
         text.replace("\"complete\": true", "\"complete\": false")
     });
     replaced(&path.join("forces.csv"), |text| without_record(&text, 50));
-    match again(&path) {
-        Ok(report) => {
-            assert!(report.forces <= 49, "{report}");
-            assert_eq!(report.first_difference, None);
-            assert!(report.gap.is_some_and(|gap| gap.contains("not whole")));
-        }
-        Err(error) => panic!("{error}"),
-    }
+    assert_a_gap(&path, |report| report.forces);
 }
 
 /// What its manifest is written to first has a longer path than the system takes, its scene has not: begun, and no more.
@@ -227,16 +212,9 @@ fn a_recording_that_cannot_be_begun_leaves_nothing() {
         if was_there {
             assert!(std::fs::create_dir(&path).is_ok());
         }
-        let workbench = shipped_workbench(&[]);
-        let key = ClusterKey::generate().expect("no random numbers");
-        let overrides = Overrides {
-            scene: Some("sphere-on-plane".to_owned()),
-            no_monitor: true,
-            recording: Some(path.clone()),
-            ..Overrides::default()
-        };
-        let started = session_setup(&workbench, key, &overrides).and_then(Session::start);
-        let why = started.err().map(|why| why.to_string());
+        let why = started("sphere-on-plane", &path)
+            .err()
+            .map(|why| why.to_string());
         assert!(why.is_some_and(|why| why.contains("recording.json.partial")));
         let left = std::fs::read_dir(&path).map(Iterator::count).ok();
         assert_eq!(left, was_there.then_some(0));
@@ -252,9 +230,7 @@ fn an_export_needs_a_recording_and_leaves_nothing_without_one() {
         directory.path().as_os_str(),
         "--out".as_ref(),
     ];
-    let output = taut(&[&arguments[..], &[out.as_os_str()]].concat());
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    let said = refusal(&taut(&[&arguments[..], &[out.as_os_str()]].concat()));
     assert!(said.contains("name the directory of a recording"), "{said}");
     assert!(std::fs::read_dir(directory.path()).is_ok_and(|mut left| left.next().is_none()));
 }

@@ -5,7 +5,7 @@ use std::process::Output;
 
 use taut_scene::REPLAY_COLUMNS;
 
-use crate::support::taut;
+use crate::support::{refusal, taut};
 
 fn temporary() -> tempfile::TempDir {
     tempfile::tempdir().expect("no temporary directory")
@@ -60,9 +60,7 @@ fn the_answer_replaces_no_file_that_the_scene_names() {
         assert!(std::fs::write(path(name), text).is_ok());
     }
     let scene = path("scene.toml").display().to_string();
-    let output = replay(directory.path(), &scene, &[]);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    let said = refusal(&replay(directory.path(), &scene, &[]));
     assert!(said.contains("it is read for this answer"), "{said}");
     assert!(std::fs::read_to_string(path("out.csv")).is_ok_and(|text| text == trace));
 }
@@ -137,9 +135,7 @@ fn a_failing_replay_leaves_no_file_and_says_one_sentence() {
     let directory = temporary();
     let broken = "t,x,y,z,qw,qx,qy,qz\n0.0,0.05,0,0.04,1,0,0,0\n0.001,nan,0,0.04,1,0,0,0\n";
     assert!(std::fs::write(directory.path().join("hand.csv"), broken).is_ok());
-    let output = replay(directory.path(), "sphere-on-plane", &[]);
-    assert_eq!(output.status.code(), Some(2));
-    let error = String::from_utf8_lossy(&output.stderr);
+    let error = refusal(&replay(directory.path(), "sphere-on-plane", &[]));
     assert!(
         error.starts_with("taut: ")
             && error.contains("hand.csv:3")

@@ -18,7 +18,7 @@ use taut_link::{
     ClientOptions, ClusterKey, ReceivedState, Role, connect, create_key_file, read_key_file,
 };
 
-use crate::support::{PATIENCE, shipped_workbench};
+use crate::support::{PATIENCE, no_monitor, shipped_workbench};
 
 fn setup() -> SessionSetup {
     let key = ClusterKey::generate().expect("no random numbers");
@@ -28,17 +28,7 @@ fn setup() -> SessionSetup {
 fn setup_of(scene: &str, key: ClusterKey) -> SessionSetup {
     let scene = format!("scene=\"{scene}\"");
     let workbench = shipped_workbench(&[&scene]);
-    match session_setup(
-        &workbench,
-        key,
-        &Overrides {
-            no_monitor: true,
-            ..Overrides::default()
-        },
-    ) {
-        Ok(setup) => setup,
-        Err(error) => panic!("{error}"),
-    }
+    session_setup(&workbench, key, &no_monitor()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A driver with a bug.

@@ -7,7 +7,7 @@ use std::process::{Output, Stdio};
 
 use taut_scene::{Device, Workbench};
 
-use crate::support::{Workplace, command, taut};
+use crate::support::{Workplace, command, refusal, taut};
 
 /// Runs it with these answers, one a line.
 fn answered(place: &Workplace, answers: &str) -> Output {
@@ -45,9 +45,8 @@ fn the_defaults_are_a_workbench_that_can_be_deployed() {
     assert!(deployed.status.success(), "{deployed:?}");
     // What is there is not written over.
     let before = fs::read(&file).expect("written");
-    let again = taut(&["setup", "--yes", "--out", &file]);
-    assert_eq!(again.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&again.stderr).contains("not written over"));
+    let again = refusal(&taut(&["setup", "--yes", "--out", &file]));
+    assert!(again.contains("not written over"));
     assert_eq!(fs::read(&file).expect("there"), before);
 }
 
@@ -107,9 +106,7 @@ fn answers_through_a_pipe_are_what_is_written() {
 #[test]
 fn answers_that_end_early_leave_no_file() {
     let place = Workplace::new();
-    let output = answered(&place, "mine\n2\n");
-    assert_eq!(output.status.code(), Some(2));
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    let error = refusal(&answered(&place, "mine\n2\n"));
     assert!(
         error.contains("name of the haptic PC") && error.contains("--yes"),
         "{error}"
@@ -144,9 +141,7 @@ fn wrong_answers_without_end_long_ones_and_a_place_that_cannot_be_written_leave_
     let endless = format!("{BEGUN}{}", "many\n".repeat(100));
     let long = format!("{BEGUN}{}\n", "1".repeat(5000));
     for (answers, part) in [(endless, "5 answers did not do"), (long, "4096 bytes")] {
-        let output = answered(&place, &answers);
-        assert_eq!(output.status.code(), Some(2));
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        let error = refusal(&answered(&place, &answers));
         assert!(
             error.contains(part) && error.contains("number of screens"),
             "{error}"
@@ -155,9 +150,7 @@ fn wrong_answers_without_end_long_ones_and_a_place_that_cannot_be_written_leave_
     }
     place.write("file", "");
     let below = place.text("file/mine.toml");
-    let output = taut(&["setup", "--yes", "--out", &below]);
-    assert_eq!(output.status.code(), Some(2), "{output:?}");
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    let error = refusal(&taut(&["setup", "--yes", "--out", &below]));
     assert!(
         error.contains(&below) && error.contains("another --out"),
         "{error}"
@@ -169,8 +162,7 @@ fn a_folder_that_is_missing_is_told_before_a_question_is_asked() {
     let place = Workplace::new();
     let out = place.text("nowhere/mine.toml");
     let output = taut(&["setup", "--out", &out]);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    let said = refusal(&output);
     assert!(said.contains("nowhere is no folder"), "{said}");
     assert!(output.stdout.is_empty(), "{output:?}");
     assert!(!said.contains("name of the workbench"), "{said}");

@@ -1,20 +1,21 @@
 //! The viewer's head from a tracker on the network, to the states that every screen draws: `taut track` with a credential of its own, beside
 //! an observer with his.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Parser;
 use taut::cli::{Cli, Command, TrackArgs};
 use taut::session::Session;
-use taut::session::setup::workbench::{Overrides, session_setup};
+use taut::session::setup::workbench::session_setup;
 use taut_link::{
-    ClientLink, ClientOptions, ClusterKey, Holder, LinkError, Role, connect, write_credential_file,
+    ClientLink, ClientOptions, ClusterKey, Holder, JoinKey, LinkError, Role, connect,
+    write_credential_file,
 };
 use taut_proto::state::HEAD_TRACKED;
 use taut_scene::{HeadTracking, SHIPPED_WORKBENCH, Workbench};
 
-use crate::support::PATIENCE;
+use crate::support::{PATIENCE, no_monitor};
 
 /// A head that stands half a metre beside its rest, for as long as the test wants.
 const TRACE: &str = "t,x,y,z,qw,qx,qy,qz\n0,0.5,-1.3,0.9,1,0,0,0\n1,0.5,-1.3,0.9,1,0,0,0\n";
@@ -39,11 +40,7 @@ fn session(key: ClusterKey, quic_port: u16) -> Session {
     let workbench = Workbench::parse_with_overrides("w.toml", &text, Path::new(""), &overrides)
         .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(workbench.viewer.tracking, HeadTracking::Remote);
-    let no_monitor = Overrides {
-        no_monitor: true,
-        ..Overrides::default()
-    };
-    session_setup(&workbench, key, &no_monitor)
+    session_setup(&workbench, key, &no_monitor())
         .and_then(Session::start)
         .unwrap_or_else(|error| panic!("{error}"))
 }
@@ -61,6 +58,30 @@ fn track_arguments(server: &str, key: &Path, trace: &Path, more: &str) -> TrackA
         Ok(Some(Command::Track(args))) => args,
         other => panic!("{other:?}"),
     }
+}
+
+/// Somebody who looks on.
+async fn observer(server: &str, key: &ClusterKey) -> ClientLink {
+    let credential = key.credential(Role::Observer, Holder::AnyNode, 1);
+    let joined = join(server, credential, Role::Observer).await;
+    joined.unwrap_or_else(|error| panic!("{error}"))
+}
+
+async fn join(server: &str, key: impl Into<JoinKey>, role: Role) -> Result<ClientLink, LinkError> {
+    connect(ClientOptions {
+        connect_timeout: PATIENCE,
+        ..ClientOptions::new(server, key, role, role.to_string())
+    })
+    .await
+}
+
+/// Files of a trace and of the tracker's credential.
+fn tracker_files(folder: &Path, key: &ClusterKey) -> (PathBuf, PathBuf) {
+    let (trace, tracker_key) = (folder.join("head.csv"), folder.join("tracker.key"));
+    assert!(std::fs::write(&trace, TRACE).is_ok());
+    let made = key.credential(Role::Tracker, Holder::AnyNode, 1);
+    write_credential_file(&tracker_key, &made).unwrap_or_else(|error| panic!("{error}"));
+    (trace, tracker_key)
 }
 
 /// Waits until the head in the states is at `x`, m; how many states had it tracked.
@@ -88,29 +109,11 @@ fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_ba
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
     let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
     let session = session(key.clone(), 0);
-    let server = session
-        .quic_address()
-        .map(|address| address.to_string())
-        .unwrap_or_else(|| panic!("no address"));
-    let trace = folder.path().join("head.csv");
-    assert!(std::fs::write(&trace, TRACE).is_ok());
-    let credential = |role: Role| {
-        let path = folder.path().join(format!("{role}.key"));
-        let made = key.credential(role, Holder::AnyNode, 1);
-        write_credential_file(&path, &made).unwrap_or_else(|error| panic!("{error}"));
-        (path, made)
-    };
-    let (tracker_key, _) = credential(Role::Tracker);
-    let (_, observer) = credential(Role::Observer);
+    let server = session.quic_address().expect("no address").to_string();
+    let (trace, tracker_key) = tracker_files(folder.path(), &key);
     let runtime = tokio::runtime::Runtime::new().unwrap_or_else(|error| panic!("{error}"));
     runtime.block_on(async {
-        let options = ClientOptions {
-            connect_timeout: PATIENCE,
-            ..ClientOptions::new(&server, observer, Role::Observer, "web")
-        };
-        let observer = connect(options)
-            .await
-            .unwrap_or_else(|error| panic!("{error}"));
+        let observer = observer(&server, &key).await;
         head_at(&observer, 0.0).await;
         let args = track_arguments(&server, &tracker_key, &trace, "--duration=4");
         let tracking = tokio::spawn(async move { taut::commands::track::run(&args).await });
@@ -122,11 +125,7 @@ fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_ba
         head_at(&observer, 0.0).await;
 
         // The roles that this workbench does not let in, although the key could make them.
-        let options = ClientOptions {
-            connect_timeout: PATIENCE,
-            ..ClientOptions::new(&server, key.clone(), Role::Operator, "o")
-        };
-        match connect(options).await {
+        match join(&server, key.clone(), Role::Operator).await {
             Err(LinkError::Refused { text, .. }) => assert!(text.raw().contains("network.roles")),
             Err(other) => panic!("{other}"),
             Ok(_) => panic!("let in"),
@@ -142,23 +141,12 @@ fn a_tracker_that_stays_moves_the_head_of_the_next_session_too() {
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
     let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
     let first = session(key.clone(), 0);
-    let address = first.quic_address().unwrap_or_else(|| panic!("no address"));
+    let address = first.quic_address().expect("no address");
     let server = address.to_string();
-    let trace = folder.path().join("head.csv");
-    assert!(std::fs::write(&trace, TRACE).is_ok());
-    let tracker_key = folder.path().join("tracker.key");
-    let made = key.credential(Role::Tracker, Holder::AnyNode, 1);
-    write_credential_file(&tracker_key, &made).unwrap_or_else(|error| panic!("{error}"));
+    let (trace, tracker_key) = tracker_files(folder.path(), &key);
     let runtime = tokio::runtime::Runtime::new().unwrap_or_else(|error| panic!("{error}"));
     let watch = async || {
-        let observer = key.credential(Role::Observer, Holder::AnyNode, 1);
-        let options = ClientOptions {
-            connect_timeout: PATIENCE,
-            ..ClientOptions::new(&server, observer, Role::Observer, "web")
-        };
-        let observer = connect(options)
-            .await
-            .unwrap_or_else(|error| panic!("{error}"));
+        let observer = observer(&server, &key).await;
         head_at(&observer, 0.5).await;
         observer.close().await;
     };

@@ -13,8 +13,9 @@ use taut_link::{
 use taut_proto::ForceSample;
 use taut_proto::control::RefusalCode;
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
+use tempfile::TempDir;
 
-use crate::support::{PATIENCE, Workplace, command};
+use crate::support::{PATIENCE, command, no_monitor, refusal};
 
 /// A path far above the plane.
 pub(crate) const STILL: &str = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.2,1,0,0,0\n1,0,0,0.2,1,0,0,0\n";
@@ -41,29 +42,25 @@ fn workbench(more: &[&str]) -> Result<Workbench, String> {
 }
 
 /// A session whose simulated hand goes on [`STILL`].
-fn session(key: &ClusterKey, more: &[&str]) -> (Session, tempfile::TempDir) {
+fn session(key: &ClusterKey, more: &[&str]) -> (Session, TempDir) {
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
     let path = folder.path().join("still.csv");
     assert!(std::fs::write(&path, STILL).is_ok());
     let path = format!("device.path={:?}", path.display().to_string());
     let wanted = [&["device.hand=\"firm\"", path.as_str()], more].concat();
     let workbench = workbench(&wanted).unwrap_or_else(|error| panic!("{error}"));
-    let no_monitor = Overrides {
-        no_monitor: true,
+    let recorded = Overrides {
         recording: Some(folder.path().join("session")),
-        ..Overrides::default()
+        ..no_monitor()
     };
-    let session = session_setup(&workbench, key.clone(), &no_monitor)
+    let session = session_setup(&workbench, key.clone(), &recorded)
         .and_then(Session::start)
         .unwrap_or_else(|error| panic!("{error}"));
     (session, folder)
 }
 
 fn address(session: &Session) -> String {
-    let address = session
-        .quic_address()
-        .unwrap_or_else(|| panic!("no address"));
-    address.to_string()
+    session.quic_address().expect("no address").to_string()
 }
 
 async fn join(
@@ -131,10 +128,6 @@ pub(crate) fn felt(folder: &Path) -> Vec<Felt> {
         .collect()
 }
 
-fn runtime() -> tokio::runtime::Runtime {
-    tokio::runtime::Runtime::new().unwrap_or_else(|error| panic!("{error}"))
-}
-
 fn sample(link: &ClientLink, index: u64, force: f64) -> ForceSample {
     let now = link.session_now().unwrap_or_else(|| panic!("no clock"));
     ForceSample {
@@ -155,15 +148,7 @@ fn end(session: Session) {
 fn a_sender_gives_one_newton_the_hand_feels_it_and_when_the_sender_dies_it_fades_and_is_gone() {
     let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
     let (session, folder) = session(&key, &[]);
-    let place = Workplace::new();
-    let credential = place.path("force.key");
-    let made = key.credential(Role::Force, Holder::AnyNode, 1);
-    write_credential_file(&credential, &made).unwrap_or_else(|error| panic!("{error}"));
-    let mut sender = sender(
-        &address(&session),
-        &credential,
-        &["--wrench", "1,0,0,0,0,0"],
-    );
+    let mut sender = sender_to(&session, &folder, &key, &["--wrench", "1,0,0,0,0,0"]);
     let begun = Instant::now();
     let last_seen = || {
         assert!(begun.elapsed() < PATIENCE, "the force is not felt");
@@ -231,23 +216,23 @@ pub(crate) fn sender(server: &str, key: &Path, more: &[&str]) -> Child {
         .expect("taut starts")
 }
 
+/// The same to this session, with a credential of its own.
+fn sender_to(session: &Session, folder: &TempDir, key: &ClusterKey, more: &[&str]) -> Child {
+    let credential = folder.path().join("force.key");
+    let made = key.credential(Role::Force, Holder::AnyNode, 1);
+    write_credential_file(&credential, &made).unwrap_or_else(|error| panic!("{error}"));
+    sender(&address(session), &credential, more)
+}
+
 #[test]
 fn a_sensor_writes_lines_and_one_that_is_no_wrench_ends_the_sender_by_name() {
     let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
-    let (session, _folder) = session(&key, &[]);
-    let place = Workplace::new();
-    let credential = place.path("force.key");
-    let made = key.credential(Role::Force, Holder::AnyNode, 1);
-    write_credential_file(&credential, &made).unwrap_or_else(|error| panic!("{error}"));
-    let mut sender = sender(&address(&session), &credential, &[]);
+    let (session, folder) = session(&key, &[]);
+    let mut sender = sender_to(&session, &folder, &key, &[]);
     let mut input = sender.stdin.take().unwrap_or_else(|| panic!("no pipe"));
     let begun = Instant::now();
-    while session
-        .metrics()
-        .session
-        .external_wrench
-        .is_none_or(|report| report.force_n < 0.5)
-    {
+    let report = || session.metrics().session.external_wrench;
+    while report().is_none_or(|report| report.force_n < 0.5) {
         assert!(begun.elapsed() < PATIENCE, "the force is not felt");
         assert!(writeln!(input, "0.6 0 0 0 0 0").is_ok());
         std::thread::sleep(Duration::from_millis(5));
@@ -256,8 +241,7 @@ fn a_sensor_writes_lines_and_one_that_is_no_wrench_ends_the_sender_by_name() {
     let ended = sender
         .wait_with_output()
         .unwrap_or_else(|error| panic!("{error}"));
-    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(2), "{said}");
+    let said = refusal(&ended);
     assert!(
         said.contains("six numbers") && said.contains("line "),
         "{said}"
@@ -316,7 +300,8 @@ async fn assert_alone(session: &Session, key: &ClusterKey, index: &mut u64) {
 fn old_repeated_overtaken_future_and_flooding_values_give_no_other_force() {
     let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
     let (session, folder) = session(&key, &[]);
-    runtime().block_on(async {
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+    runtime.block_on(async {
         let link = join(&key, Role::Force, "robot", &address(&session)).await;
         let link = link.unwrap_or_else(|error| panic!("{error}"));
         // Half a second ago is a time of this session, too.

@@ -9,7 +9,7 @@ use taut_bridge::BridgeReport;
 use taut_link::create_key_file;
 use taut_test_kit::relay::Impairment;
 
-use crate::support::{PATIENCE, shipped_workbench, start_behind_relay, start_bridge};
+use crate::support::{PATIENCE, no_monitor, shipped_workbench, start_behind_relay, start_bridge};
 use crate::wrench_in::{STILL, felt, sender};
 
 /// What the hand of a bridge felt along x, N, tick by tick, of a source of 1 N that is killed once it was felt for a second; source and bridge are `delay_us`
@@ -28,9 +28,8 @@ fn run(coupling: &str, passivity: &str, delay_us: u64) -> (Vec<f64>, BridgeRepor
         "network.node_timeout=20.0",
     ];
     let overrides = Overrides {
-        no_monitor: true,
         recording: Some(folder.path().join("session")),
-        ..Overrides::default()
+        ..no_monitor()
     };
     let setup = session_setup(&shipped_workbench(&wanted), key, &overrides).expect("a session");
     let impairment = Impairment {

@@ -5,10 +5,12 @@ mod machine;
 mod running;
 
 use std::ffi::OsStr;
+use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use taut::session::setup::workbench::Overrides;
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
 pub(crate) use bridge::{start_behind_relay, start_bridge};
@@ -74,16 +76,28 @@ pub(crate) fn workbench() -> String {
 
 /// Runs the program to its end.
 pub(crate) fn taut<S: AsRef<OsStr>>(arguments: &[S]) -> Output {
-    let child = start(arguments);
-    match child.wait_with_output() {
-        Ok(output) => output,
-        Err(error) => panic!("taut cannot be waited for: {error}"),
-    }
+    command(arguments).output().expect("taut starts")
 }
 
-/// Starts the program; what it says can be read.
-pub(crate) fn start<S: AsRef<OsStr>>(arguments: &[S]) -> Child {
-    command(arguments).spawn().expect("taut starts")
+/// What the program says that refuses to work.
+pub(crate) fn refusal(output: &Output) -> String {
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    said
+}
+
+/// An address of this machine that was free just now.
+pub(crate) fn free_address() -> String {
+    let free = UdpSocket::bind(("127.0.0.1", 0)).and_then(|socket| socket.local_addr());
+    free.expect("no port").to_string()
+}
+
+/// A session without a monitor.
+pub(crate) fn no_monitor() -> Overrides {
+    Overrides {
+        no_monitor: true,
+        ..Overrides::default()
+    }
 }
 
 /// The program with pipes for what it says, and without what this process's environment may tell it.
