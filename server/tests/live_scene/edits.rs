@@ -36,7 +36,7 @@ fn what_cannot_be_taken_changes_nothing_and_says_why() {
     }
     // One of several: none.
     let two = ["plate.color=\"#ffffff\"", "plate.opacity=7"];
-    assert_eq!(served.edit(&json!({ "edits": two })).0, 409);
+    served.refuses(&json!({ "edits": two }), "");
     for wish in [
         json!({}),
         json!({ "scene": "other.toml" }),
@@ -44,7 +44,7 @@ fn what_cannot_be_taken_changes_nothing_and_says_why() {
         json!({ "edits": "x" }),
         json!([]),
     ] {
-        assert_eq!(served.edit(&wish).0, 409, "{wish}");
+        served.refuses(&wish, "");
     }
     assert_eq!(served.revision(), 1);
     assert_eq!(served.file(), SCENE);
@@ -58,8 +58,7 @@ fn what_cannot_be_taken_changes_nothing_and_says_why() {
     place.write("bench.toml", SCENE);
     let recording = place.text("recording");
     let served = Served::start_in(place, &bench(&[]), &["--recording", &recording]);
-    let (status, said) = served.edit(&json!({ "edits": ["plate.color=\"#ffffff\""] }));
-    assert!(status == 409 && said.contains("recorded"), "{said}");
+    served.refuses(&json!({ "edits": ["plate.color=\"#ffffff\""] }), "recorded");
 }
 
 #[test]
@@ -108,19 +107,14 @@ fn who_may_not_change_it_costs_nobody_anything() {
     let begun = Instant::now();
     let mut sent = 0;
     while begun.elapsed() < Duration::from_secs(2) {
-        let of_token =
-            served.edit(&json!({ "revision": 99, "edits": ["plate.color=\"#ffffff\""] }));
-        assert!(
-            of_token.0 == 409 && of_token.1.contains("revision 99"),
-            "{of_token:?}"
-        );
+        let stale = json!({ "revision": 99, "edits": ["plate.color=\"#ffffff\""] });
+        served.refuses(&stale, "revision 99");
         assert_eq!(served.post(&sized(&host, body.len()), &body).0, 401);
         sent += 2;
     }
     let t = served.now("t").as_f64().expect("a number");
     wait_until("the page goes on", || served.now("t").as_f64() > Some(t));
-    let (status, said) = served.ask("POST /disarm", &format!("{shown}Content-Length: 0\r\n"));
-    assert_eq!(status, 200, "{said}");
+    assert_eq!(served.ask("POST /disarm", &served.with_token()).0, 200);
     assert_eq!(served.revision(), 1, "after {sent} requests");
     let refused = served.lines_with(&["event=\"refused\""]);
     assert!(refused < 20, "{refused} lines: {}", served.text());
@@ -176,10 +170,9 @@ fn of_two_editors_the_later_one_builds_upon_the_first_or_hears_that_it_was_faste
     );
     assert_eq!(served.plate("friction").to_string(), first);
     // Of whatever runs: both stand.
-    let (code, said) = served.taut_edit(&["plate.color=#30c030", "coupling.k_h=1500"]);
-    assert!(
-        code == Some(0) && said.contains("revision 3 runs"),
-        "{said}"
+    let said = served.edits(
+        &["plate.color=#30c030", "coupling.k_h=1500"],
+        "revision 3 runs",
     );
     assert!(
         said.contains("\nwarning: ") && said.contains("lets go"),
@@ -193,16 +186,11 @@ fn of_two_editors_the_later_one_builds_upon_the_first_or_hears_that_it_was_faste
         scene["standing"]["not_kept"].as_array().map(Vec::len),
         Some(4)
     );
-    let (code, said) = served.taut_edit(&["--revision", "2", "plate.color=#3030c0"]);
-    assert!(
-        code == Some(2) && said.contains("revision 2 of the scene, and 3 runs"),
-        "{said}"
+    served.edits_not(
+        &["--revision", "2", "plate.color=#3030c0"],
+        "revision 2 of the scene, and 3 runs",
     );
-    let (code, said) = served.taut_edit(&[]);
-    assert!(
-        code == Some(0) && said.contains("plate.color=\"#30c030\""),
-        "{said}"
-    );
+    let said = served.edits(&[], "plate.color=\"#30c030\"");
     assert!(said.contains("  plate.roughness: as usual\n"), "{said}");
     assert!(
         said.contains("not in the file: coupling.k_h: as usual -> 1500"),
@@ -214,27 +202,15 @@ fn of_two_editors_the_later_one_builds_upon_the_first_or_hears_that_it_was_faste
 fn what_is_kept_is_in_the_file_with_its_comments_and_no_other_change_of_the_file_is_lost() {
     let served = serve(&[], &["--follow-scene"]);
     served.wait_for_run("paused");
-    let (code, said) = served.taut_edit(&["plate.surface.friction=0.5"]);
-    assert!(
-        code == Some(0) && said.contains("does not have it"),
-        "{said}"
-    );
-    let (code, said) = served.taut_edit(&["--keep", "plate.color=#30c030"]);
-    assert!(
-        code == Some(0) && said.contains("the file has it"),
-        "{said}"
-    );
+    served.edits(&["plate.surface.friction=0.5"], "does not have it");
+    served.edits(&["--keep", "plate.color=#30c030"], "the file has it");
     let kept = SCENE
         .replace("\"#c03030\" # red", "\"#30c030\" # red")
         .replace("friction = 0.2", "friction = 0.5");
     assert_eq!(served.file(), kept);
     assert_eq!(served.scene()["standing"]["not_kept"], json!([]));
     // Its own writing is no change of the file: a change of somebody's is.
-    let (code, said) = served.taut_edit(&["plate.opacity=0.5"]);
-    assert!(
-        code == Some(0) && said.contains("revision 4 runs"),
-        "{said}"
-    );
+    served.edits(&["plate.opacity=0.5"], "revision 4 runs");
     assert_eq!(served.file(), kept);
     served.place.write(
         "bench.toml",
@@ -246,11 +222,7 @@ fn what_is_kept_is_in_the_file_with_its_comments_and_no_other_change_of_the_file
     let is_of_next = code == Some(2) && said.contains("went with that") && served.revision() == 5;
     assert!(is_refused || is_of_next, "{said}");
     wait_until("the file is followed", || served.revision() == 5);
-    let (code, said) = served.taut_edit(&["--keep"]);
-    assert!(
-        code == Some(2) && said.contains("went with that (plate.opacity"),
-        "{said}"
-    );
+    served.edits_not(&["--keep"], "went with that (plate.opacity");
     assert!(
         served.says(&["not kept in a file, is gone", "plate.opacity"]),
         "{}",
@@ -259,13 +231,11 @@ fn what_is_kept_is_in_the_file_with_its_comments_and_no_other_change_of_the_file
     assert_eq!(served.plate("friction"), 0.7);
     assert_eq!(served.plate("opacity"), 1.0);
     // Later, by itself: what was changed before.
-    let (code, said) = served.taut_edit(&["plate.opacity=0.25"]);
-    assert!(code == Some(0), "{said}");
+    served.edits(&["plate.opacity=0.25"], "");
     wait_until("kept", || served.taut_edit(&["--keep"]).0 == Some(0));
     assert!(served.file().contains("opacity = 0.25") && served.file().contains("# The plate"));
     assert_eq!(served.revision(), 6, "no session for that");
-    let (code, said) = served.taut_edit(&["plate.opacity=1"]);
-    assert!(code == Some(0) && said.contains("revision 7"), "{said}");
+    served.edits(&["plate.opacity=1"], "revision 7");
 }
 
 #[test]
@@ -273,20 +243,14 @@ fn what_runs_already_is_kept_without_another_session() {
     let served = serve(&[], &[]);
     served.wait_for_run("paused");
     let edit = "plate.surface.friction=0.5";
-    let (code, said) = served.taut_edit(&[edit]);
-    assert!(
-        code == Some(0) && said.contains("does not have it"),
-        "{said}"
-    );
-    let (code, said) = served.taut_edit(&["--keep", edit]);
-    assert!(code == Some(0) && said.contains("kept: "), "{said}");
+    served.edits(&[edit], "does not have it");
+    served.edits(&["--keep", edit], "kept: ");
     let kept = SCENE.replace("friction = 0.2", "friction = 0.5");
     assert_eq!(served.file(), kept);
     assert_eq!(served.scene()["standing"]["not_kept"], json!([]));
     assert_eq!(served.revision(), 2, "no session for that");
     // The file has it now.
-    let (code, said) = served.taut_edit(&["--keep", edit]);
-    assert!(code == Some(2) && said.contains("already"), "{said}");
+    served.edits_not(&["--keep", edit], "already");
 }
 
 #[test]
@@ -308,33 +272,23 @@ fn another_scene_is_chosen_of_those_that_the_workbench_file_names() {
     served.wait_for_run("running");
     let instance = session("instance");
     // Somebody has taken the force away: no change of the scene brings it back.
-    let shown = format!(
-        "{}Authorization: Bearer {TOKEN}\r\nContent-Length: 0\r\n",
-        served.host()
-    );
-    assert_eq!(served.ask("POST /disarm", &shown).0, 200);
+    assert_eq!(served.ask("POST /disarm", &served.with_token()).0, 200);
     served.wait_for_run("paused");
-    let (status, said) =
-        served.edit(&json!({ "scene": "other.toml", "edits": ["plate.color=\"#30c030\""] }));
-    assert_eq!(status, 200, "{said}");
+    served.takes(&json!({ "scene": "other.toml", "edits": ["plate.color=\"#30c030\""] }));
     wait_until("the other scene", || session("scene") == "other");
     assert_eq!(session("instance"), instance, "the same page");
     served.wait_for_run("paused");
     assert!(served.now("force_n") == 0.0);
-    let (status, said) = served.edit(&json!({ "scene": "peg-in-a-hole" }));
-    assert_eq!(status, 200, "{said}");
-    let (status, said) =
-        served.edit(&json!({ "edits": ["god_object.color=\"#ffffff\""], "keep": true }));
-    assert!(status == 409 && said.contains("no file"), "{said}");
-    assert_eq!(served.ask("POST /arm", &shown).0, 200);
+    served.takes(&json!({ "scene": "peg-in-a-hole" }));
+    let kept = json!({ "edits": ["god_object.color=\"#ffffff\""], "keep": true });
+    served.refuses(&kept, "no file");
+    assert_eq!(served.ask("POST /arm", &served.with_token()).0, 200);
     served.wait_for_run("running");
     // The one that the workbench file names stays one of them.
-    let (status, said) = served.edit(&json!({ "scene": "bench.toml" }));
-    assert_eq!(status, 200, "{said}");
+    served.takes(&json!({ "scene": "bench.toml" }));
     wait_until("the bench again", || session("scene") == "bench");
     served.wait_for_run("running");
-    let (status, said) = served.edit(&json!({ "scene": "other.toml" }));
-    assert_eq!(status, 200, "{said}");
+    served.takes(&json!({ "scene": "other.toml" }));
     wait_until("the other scene", || session("scene") == "other");
     // The workbench file names another: that counts again.
     let text = std::fs::read_to_string(served.place.path("workbench.toml")).expect("a file");

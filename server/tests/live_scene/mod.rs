@@ -58,6 +58,19 @@ impl Served {
         self.post(&head, &body)
     }
 
+    /// What it says to a wish that it takes.
+    pub(crate) fn takes(&self, wish: &Value) -> String {
+        let (status, said) = self.edit(wish);
+        assert_eq!(status, 200, "{said}");
+        said
+    }
+
+    /// That it says why it takes none of a wish.
+    pub(crate) fn refuses(&self, wish: &Value, why: &str) {
+        let (status, said) = self.edit(wish);
+        assert!(status == 409 && said.contains(why), "{wish}: {said}");
+    }
+
     fn post(&self, head: &str, body: &str) -> (u16, String) {
         let mut stream = self.send("POST /edit", head);
         // Who is refused by his head alone may find the connection closed.
@@ -88,6 +101,19 @@ impl Served {
 
     fn file(&self) -> String {
         std::fs::read_to_string(self.place.path("bench.toml")).expect("a file")
+    }
+
+    /// That `taut edit` does it and says this.
+    fn edits(&self, more: &[&str], part: &str) -> String {
+        let (code, said) = self.taut_edit(more);
+        assert!(code == Some(0) && said.contains(part), "{said}");
+        said
+    }
+
+    /// That `taut edit` refuses it and says this.
+    fn edits_not(&self, more: &[&str], part: &str) {
+        let (code, said) = self.taut_edit(more);
+        assert!(code == Some(2) && said.contains(part), "{said}");
     }
 
     fn taut_edit(&self, more: &[&str]) -> (Option<i32>, String) {
