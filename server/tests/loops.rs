@@ -41,12 +41,8 @@ fn pressing_hand(scene: &BuiltScene) -> SimulatedDevice {
         at(2.0, radius - 0.01),
         at(3.0, 0.04),
     ];
-    match MinJerkPath::new(points, false) {
-        Ok(path) => {
-            SimulatedDevice::new(Grip::workbench(), Hand::FIRM, path, scene.reference_point())
-        }
-        Err(error) => panic!("{error}"),
-    }
+    let path = MinJerkPath::new(points, false).expect("a path");
+    SimulatedDevice::new(Grip::workbench(), Hand::FIRM, path, scene.reference_point())
 }
 
 impl VirtualSession {
@@ -73,6 +69,22 @@ impl VirtualSession {
         self.loops.coupling.tick(now);
         if now.as_millis().is_multiple_of(u128::from(god_object_ticks)) {
             self.loops.god_object.tick(|| now);
+        }
+    }
+
+    /// So many of them, with loop 1 in each.
+    pub(crate) fn ticks(&mut self, count: u32) {
+        for _ in 0..count {
+            self.tick(1);
+        }
+    }
+
+    /// The same while loop 1 hangs.
+    pub(crate) fn hang(&mut self, count: u32) {
+        for _ in 0..count {
+            self.now += TICK;
+            self.loops.haptics.tick(self.now);
+            self.loops.coupling.tick(self.now);
         }
     }
 }
@@ -174,9 +186,7 @@ fn pressed_until(at: Duration) -> (VirtualSession, impl Fn() -> f64) {
 #[test]
 fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
     let (mut session, felt) = pressed_until(Duration::from_millis(1500));
-    for _ in 0..1499 {
-        session.tick(1);
-    }
+    session.ticks(1499);
     assert!(felt() > 2.0);
     let count =
         |session: &VirtualSession, kind| session.loops.haptics.statistics().incidents.of(kind);
@@ -200,9 +210,7 @@ fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
 #[test]
 fn a_silent_coupling_lets_the_force_fade() {
     let (mut session, felt) = pressed_until(Duration::MAX);
-    for _ in 0..1500 {
-        session.tick(1);
-    }
+    session.ticks(1500);
     assert!(felt() > 2.0);
     for _ in 0..150 {
         session.now += TICK;
@@ -214,20 +222,10 @@ fn a_silent_coupling_lets_the_force_fade() {
 #[test]
 fn constraints_older_than_a_tenth_of_a_second_let_the_force_fade() {
     let (mut session, felt) = pressed_until(Duration::MAX);
-    for _ in 0..1500 {
-        session.tick(1);
-    }
-    // Loop 1 hangs; loops 2 and 3 go on.
-    let mut hang = |ticks: u32| {
-        for _ in 0..ticks {
-            session.now += TICK;
-            session.loops.haptics.tick(session.now);
-            session.loops.coupling.tick(session.now);
-        }
-    };
-    hang(90);
+    session.ticks(1500);
+    session.hang(90);
     assert!(felt() > 2.0, "held at first: {}", felt());
-    hang(160);
+    session.hang(160);
     assert_eq!(felt(), 0.0);
 }
 
@@ -237,19 +235,13 @@ fn who_asks_for_no_force_gets_none_until_somebody_arms() {
     let device = pressing_hand(&scene);
     let mut session =
         VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
-    for _ in 0..1500 {
-        session.tick(1);
-    }
+    session.ticks(1500);
     let felt = |session: &VirtualSession| linear(session.loops.haptics.port().rendered()).norm();
     assert!(felt(&session) > 2.0);
     session.loops.arm_switch.wish(ArmWish::Disarm);
-    for _ in 0..150 {
-        session.tick(1);
-    }
+    session.ticks(150);
     assert_eq!(felt(&session), 0.0);
     session.loops.arm_switch.wish(ArmWish::Arm);
-    for _ in 0..150 {
-        session.tick(1);
-    }
+    session.ticks(150);
     assert!(felt(&session) > 2.0);
 }

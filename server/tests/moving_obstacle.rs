@@ -39,15 +39,13 @@ fn yielding_hand(scene: &BuiltScene) -> Box<dyn Device> {
         time_s: 0.0,
         pose: scene.start,
     };
-    match MinJerkPath::new(vec![stay], false) {
-        Ok(path) => Box::new(SimulatedDevice::new(
-            Grip::workbench(),
-            Hand::FIRM,
-            path,
-            scene.reference_point(),
-        )),
-        Err(error) => panic!("{error}"),
-    }
+    let path = MinJerkPath::new(vec![stay], false).expect("a path");
+    Box::new(SimulatedDevice::new(
+        Grip::workbench(),
+        Hand::FIRM,
+        path,
+        scene.reference_point(),
+    ))
 }
 
 /// A hand that nothing moves.
@@ -57,10 +55,8 @@ fn rigid_hand(scene: &BuiltScene) -> Box<dyn Device> {
         pose: scene.start,
         buttons: 0,
     }];
-    match RecordedDevice::new(rows, AtEnd::Hold, scene.reference_point()) {
-        Ok(device) => Box::new(device),
-        Err(error) => panic!("{error}"),
-    }
+    let device = RecordedDevice::new(rows, AtEnd::Hold, scene.reference_point());
+    Box::new(device.expect("a row"))
 }
 
 /// A session is some time old when its loops begin.
@@ -71,11 +67,16 @@ fn session_of(scene: &BuiltScene, device: Box<dyn Device>) -> VirtualSession {
     }
 }
 
+/// A replay of the scene, with what moves in it.
+fn replay(scene: &BuiltScene) -> Replay {
+    let world = Arc::new(scene.world.clone());
+    Replay::new(world, scene.settings, scene.start, None)
+        .expect("the scene starts free")
+        .with_motions(scene.motions.clone())
+}
+
 fn checker(world: &World) -> PenetrationChecker {
-    match PenetrationChecker::new(world) {
-        Some(checker) => checker,
-        None => panic!("parry refuses the meshes"),
-    }
+    PenetrationChecker::new(world).expect("parry takes the meshes")
 }
 
 #[test]
@@ -133,15 +134,9 @@ fn an_update_that_comes_late_moves_the_plate_the_whole_way_and_through_nothing()
     let scene = scene();
     let checker = checker(&scene.world);
     let mut session = session_of(&scene, rigid_hand(&scene));
-    for _ in 0..1100 {
-        session.tick(1);
-    }
+    session.ticks(1100);
     // Loop 1 stands still while the plate should come up from under the body to 15 mm over the body's place.
-    for _ in 0..300 {
-        session.now += TICK;
-        session.loops.haptics.tick(session.now);
-        session.loops.coupling.tick(session.now);
-    }
+    session.hang(300);
     session.tick(1);
     let contacts = session.loops.readers.monitor.contacts.newest();
     let (body, plate) = (contacts.set.god_object_pose, contacts.moving[0].pose);
@@ -174,7 +169,7 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
     let reference_point = scene.reference_point();
     let mut states = StateWriter::new(readers.broadcast, head, &reference_point, 1);
     let first = session.now + TICK;
-    let (mut now, mut count) = (session.now, 0);
+    let mut now = session.now;
     for _ in 0..9000 {
         now += TICK;
         haptics.tick(now);
@@ -195,23 +190,14 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
             .sum::<f32>();
         // Nothing squeezes the body: the plate is where it was sent.
         assert!(error < 1e-8 && turn.abs() > 1.0 - 1e-6, "{body:?} {pose:?}");
-        count += 1;
     }
-    assert_eq!(count, 9000);
 }
 
 #[test]
 fn the_loops_and_the_replay_move_everything_alike() {
     let scene = scene();
     let mut session = session_of(&scene, rigid_hand(&scene));
-    let replay = Replay::new(
-        Arc::new(scene.world.clone()),
-        scene.settings,
-        scene.start,
-        None,
-    );
-    let replay = replay.expect("the scene starts free");
-    let mut replay = replay.with_motions(scene.motions.clone());
+    let mut replay = replay(&scene);
     let first = session.now + TICK;
     for _ in 0..8000 {
         session.tick(1);
@@ -260,14 +246,7 @@ fn the_energy_of_a_hand_that_is_pushed_is_the_obstacles_and_not_the_couplings() 
 #[test]
 fn a_rigid_hand_takes_no_energy_and_the_plate_gets_back_what_it_put_in() {
     let scene = scene();
-    let replay = Replay::new(
-        Arc::new(scene.world.clone()),
-        scene.settings,
-        scene.start,
-        None,
-    )
-    .expect("the scene starts free");
-    let mut replay = replay.with_motions(scene.motions.clone());
+    let mut replay = replay(&scene);
     let mut most_work: f64 = 0.0;
     for row in 0..8000_u32 {
         replay.row(f64::from(row) * 1e-3, &scene.start);
