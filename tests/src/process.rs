@@ -7,10 +7,11 @@ use std::fs::File;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::str::Lines;
 use std::time::Duration;
 
 use crate::patience::wait_for;
-use crate::workbench::END_LIMIT;
+use crate::workbench::{END_LIMIT, START_LIMIT};
 
 /// The end of a process by itself.
 #[derive(Debug)]
@@ -49,27 +50,15 @@ pub struct Process {
 }
 
 impl Process {
-    /// Starts `program` with `arguments`; its output goes to `NAME.out` and `NAME.err` in `directory`.
-    pub fn start<I>(name: &str, program: impl AsRef<Path>, arguments: I, directory: &Path) -> Self
-    where
-        I: IntoIterator,
-        I::Item: AsRef<std::ffi::OsStr>,
-    {
-        Self::start_logging(name, program, arguments, directory, None)
-    }
-
-    /// The same with a filter of its log on standard error, such as `taut=info`.
-    pub fn start_logging<I>(
+    /// Starts `program` with `arguments`; its output goes to `NAME.out` and `NAME.err` in `directory`. `log` filters its log on standard error, such as
+    /// `taut=info`.
+    pub fn start(
         name: &str,
-        program: impl AsRef<Path>,
-        arguments: I,
+        program: &Path,
+        arguments: &[&str],
         directory: &Path,
         log: Option<&str>,
-    ) -> Self
-    where
-        I: IntoIterator,
-        I::Item: AsRef<std::ffi::OsStr>,
-    {
+    ) -> Self {
         let (stdout, stderr) = (
             directory.join(format!("{name}.out")),
             directory.join(format!("{name}.err")),
@@ -77,7 +66,7 @@ impl Process {
         let file = |path: &Path| {
             File::create(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
         };
-        let mut command = Command::new(program.as_ref());
+        let mut command = Command::new(program);
         command
             .args(arguments)
             .current_dir(directory)
@@ -102,9 +91,9 @@ impl Process {
             .stdout(file(&stdout))
             .stderr(file(&stderr));
         die_with_this_thread(&mut command);
-        let child = command.spawn().unwrap_or_else(|error| {
-            panic!("{} does not start: {error}", program.as_ref().display())
-        });
+        let child = command
+            .spawn()
+            .unwrap_or_else(|error| panic!("{} does not start: {error}", program.display()));
         Self {
             name: name.to_owned(),
             child,
@@ -133,21 +122,29 @@ impl Process {
     }
 
     /// The first line of standard error with this beginning, once it is there: what follows the beginning.
-    pub fn line_after(&mut self, beginning: &str, limit: Duration) -> String {
-        let what = format!("a line \"{beginning} ..\" of {}", self.name);
-        wait_for(&what, limit, || {
+    pub fn line_after(&mut self, beginning: &str) -> String {
+        self.line(&format!("\"{beginning} ..\""), |mut lines| {
+            lines.find_map(|line| line.strip_prefix(beginning).map(str::to_owned))
+        })
+    }
+
+    /// The line of standard error that is the `count`-th with all of these parts, once it is there.
+    pub fn line_with(&mut self, parts: &[&str], count: usize) -> String {
+        self.line(&format!("{parts:?}, {count} times"), |lines| {
+            let mut found = lines.filter(|line| parts.iter().all(|part| line.contains(part)));
+            found.nth(count - 1).map(str::to_owned)
+        })
+    }
+
+    fn line(&mut self, what: &str, find: impl Fn(Lines<'_>) -> Option<String>) -> String {
+        wait_for(&format!("{what} of {}", self.name), START_LIMIT, || {
             let running = self.is_running();
             let text = self.stderr();
             // A line is whole once its end is written.
             let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-            let found = whole
-                .lines()
-                .find_map(|line| line.strip_prefix(beginning).map(str::to_owned));
-            assert!(
-                found.is_some() || running,
-                "{} ended before it wrote \"{beginning} ..\"",
-                self.name
-            );
+            let found = find(whole.lines());
+            let name = &self.name;
+            assert!(found.is_some() || running, "{name} ended before {what}");
             found
         })
     }

@@ -4,9 +4,12 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use taut_link::{ClusterKey, create_key_file, read_key_file};
+use taut_link::{
+    ClientLink, ClientOptions, ClusterKey, LinkError, Role, connect, create_key_file, read_key_file,
+};
 use taut_scene::Scene;
 use tempfile::TempDir;
+use tokio::runtime::Runtime;
 use toml::{Table, Value};
 
 use crate::process::{Ended, Process};
@@ -83,7 +86,7 @@ impl TestWorkbench {
     }
 
     /// Writes the workbench file as it is now; its path. For a server that runs: [`Self::serve`] does it.
-    pub fn save(&self) -> PathBuf {
+    pub fn save(&self) -> String {
         self.write("workbench.toml", self.file.to_string())
     }
 
@@ -93,11 +96,11 @@ impl TestWorkbench {
     }
 
     /// Writes a file into the directory; its path.
-    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> String {
         let path = self.directory().join(name);
         std::fs::write(&path, content)
             .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        path
+        path.display().to_string()
     }
 
     /// The cluster key's file.
@@ -113,7 +116,7 @@ impl TestWorkbench {
     /// Starts the program under test in the directory.
     pub fn start(&self, name: &str, arguments: &[&str]) -> Process {
         let (program, directory) = (&self.program, self.directory());
-        Process::start_logging(name, program, arguments, directory, self.log)
+        Process::start(name, program, arguments, directory, self.log)
     }
 
     /// A server whose device is behind a bridge, and that bridge, started with `more` arguments: in its hand the body of a shipped scene goes the
@@ -129,7 +132,6 @@ impl TestWorkbench {
             .and_then(|scene| scene.hand_path())
             .unwrap_or_else(|error| panic!("{error}"));
         let path = self.write("hand.csv", hand.expect("the scene has a hand").to_csv());
-        let path = path.display().to_string();
         let always = ["--json", "--hand", "firm", "--path", &path, "--loop"];
         let bridge = self.join("bridge", "bridge", &server, &[&always, more].concat());
         (server, bridge)
@@ -145,14 +147,17 @@ impl TestWorkbench {
         self.serve_as("server", arguments)
     }
 
-    /// The same under another name: a server that takes the place of one that died.
-    pub fn serve_as(&self, name: &str, arguments: &[&str]) -> Server {
-        let config = self.save().display().to_string();
-        let key = self.key_path();
+    /// The same at the addresses of a server that died.
+    pub fn serve_again(&self, quic: &str, udp: &str) -> Server {
+        self.serve_as("server-again", &["--quic", quic, "--udp", udp])
+    }
+
+    fn serve_as(&self, name: &str, arguments: &[&str]) -> Server {
+        let (config, key) = (self.save(), self.key_path());
         let always = ["serve", "--config", &config, "--key", &key, "--json"];
         let mut process = self.start(name, &[&always, arguments].concat());
         // serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)
-        let addresses = process.line_after("serving on ", START_LIMIT);
+        let addresses = process.line_after("serving on ");
         let (quic, udp) = addresses
             .split_once(" (control) and ")
             .unwrap_or_else(|| panic!("two addresses: {addresses}"));
@@ -179,6 +184,21 @@ impl TestWorkbench {
             &key,
         ];
         self.start(node, &[&always, arguments].concat())
+    }
+
+    /// Joins `server` from this process.
+    ///
+    /// # Errors
+    /// What the link says.
+    pub fn connect(
+        &self,
+        runtime: &Runtime,
+        server: &Server,
+        role: Role,
+        node: &str,
+    ) -> Result<ClientLink, LinkError> {
+        let options = ClientOptions::new(server.quic.clone(), self.key(), role, node);
+        runtime.block_on(connect(options))
     }
 
     /// What this machine draws with is there; else why not, in the program's own words.

@@ -19,3 +19,4 @@ mod pictures;
 mod promises;
 mod revocation;
 mod soak;
+mod support;

@@ -71,18 +71,11 @@ fn replay_refused(
 #[test]
 fn a_broken_scene_mesh_or_trace_is_refused_by_file_and_place() {
     let workbench = TestWorkbench::new(PROGRAM);
-    let write = |name: &str, text: &str| workbench.write(name, text).display().to_string();
-    let trace = write("trace.csv", TRACE);
+    let trace = workbench.write("trace.csv", TRACE);
     workbench.write("open.obj", OPEN_MESH);
     let broken = |case: &str, text: &str, parts: &[&str]| {
-        let scene = write("scene.toml", text);
-        replay_refused(
-            &workbench,
-            case,
-            (scene.as_str(), trace.as_str()),
-            &[],
-            parts,
-        );
+        let scene = workbench.write("scene.toml", text);
+        replay_refused(&workbench, case, (&scene, &trace), &[], parts);
     };
     broken(
         "unknown key",
@@ -113,7 +106,7 @@ fn a_broken_scene_mesh_or_trace_is_refused_by_file_and_place() {
     replay("unknown override", shipped, &trace, &set, &meant);
     let gone = ["gone.csv", "check the path"];
     replay("no trace", shipped, "gone.csv", &[], &gone);
-    let turned = write("turned.csv", &replaced(TRACE, "0.04,1,", "0.04,2,"));
+    let turned = workbench.write("turned.csv", replaced(TRACE, "0.04,1,", "0.04,2,"));
     let norm = ["turned.csv:3", "norm"];
     replay("no quaternion", shipped, &turned, &[], &norm);
 }
@@ -123,21 +116,11 @@ fn a_broken_workbench_is_refused_and_nothing_of_it_starts() {
     let mut workbench = TestWorkbench::new(PROGRAM);
     let key = workbench.key_path();
     let good = workbench.file.clone();
-    let scene = workbench
-        .write("inside.toml", replaced(SCENE, "0.0, 0.05]", "0.0, 0.01]"))
-        .display()
-        .to_string();
+    let scene = workbench.write("inside.toml", replaced(SCENE, "0.0, 0.05]", "0.0, 0.01]"));
     let serve = |workbench: &TestWorkbench, case: &str, arguments: &[&str], parts: &[&str]| {
-        let config = workbench
-            .write("workbench.toml", workbench.file.to_string())
-            .display()
-            .to_string();
-        refused(
-            workbench,
-            case,
-            &[&["serve", "--config", &config, "--key", &key], arguments].concat(),
-            parts,
-        );
+        let config = workbench.save();
+        let always = ["serve", "--config", &config, "--key", &key];
+        refused(workbench, case, &[&always, arguments].concat(), parts);
     };
 
     workbench.set("network.broadcast_rte", 1000);
@@ -192,11 +175,8 @@ fn a_broken_workbench_is_refused_and_nothing_of_it_starts() {
 #[test]
 fn a_key_that_cannot_be_used_is_refused_by_its_file() {
     let workbench = TestWorkbench::new(PROGRAM);
-    let config = workbench
-        .write("workbench.toml", workbench.file.to_string())
-        .display()
-        .to_string();
-    let short = workbench.write("short.key", "abc").display().to_string();
+    let config = workbench.save();
+    let short = workbench.write("short.key", "abc");
     let serve = ["serve", "--config", &config];
     refused(
         &workbench,
@@ -243,23 +223,13 @@ fn a_server_that_is_not_there_is_named() {
         Err(reason) => taut_test_kit::left_out(format_args!("render without a server: {reason}")),
     }
     for (role, arguments) in roles {
-        refused(
-            &workbench,
-            role,
-            &[&[role, "--server", &address, "--key", &key], &arguments[..]].concat(),
-            &[&address, "firewall"],
-        );
-        let nonsense = [
-            &[role, "--server", "haptic pc", "--key", &key],
-            &arguments[..],
-        ]
-        .concat();
-        refused(
-            &workbench,
-            &format!("{role} to nonsense"),
-            &nonsense,
-            &["haptic pc"],
-        );
+        let join = |server| {
+            let always = [role, "--server", server, "--key", &key];
+            [&always, &arguments[..]].concat()
+        };
+        refused(&workbench, role, &join(&address), &[&address, "firewall"]);
+        let case = format!("{role} to nonsense");
+        refused(&workbench, &case, &join("haptic pc"), &["haptic pc"]);
     }
     assert!(!workbench.directory().join("trace.csv").exists());
 }

@@ -382,13 +382,7 @@ fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end_when_they_
     let options = ["--width", "64", "--height", "64", "--give-up", "1"];
     let drawing = adapter.is_ok().then(|| draw(&workbench, &server, &options));
     if adapter.is_ok() {
-        wait_for("the node to join", JOIN_LIMIT, || {
-            server
-                .process
-                .stderr()
-                .contains("front joined")
-                .then_some(())
-        });
+        server.process.line_with(&["front joined"], 1);
     }
     let runtime = Runtime::new().expect("a runtime");
     let client = Client::join(

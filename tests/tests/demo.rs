@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 use taut_tests::patience::wait_for;
+use taut_tests::process::Process;
 use taut_tests::workbench::{END_LIMIT, START_LIMIT, TestWorkbench};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
@@ -34,12 +35,16 @@ fn the_demo_brings_everything_up_and_reports_it() {
     assert!(enough, "not both nodes drew in step");
 }
 
+fn demo(workbench: &TestWorkbench, arguments: &str) -> Process {
+    let words = std::iter::once("demo").chain(arguments.split(' '));
+    workbench.start("demo", &words.collect::<Vec<_>>())
+}
+
 /// A demo of so many seconds; what must hold of its report on any machine.
 fn run(workbench: &TestWorkbench, adapter: &Result<(), String>, duration_s: u64) -> Value {
-    let duration = duration_s.to_string();
-    let demo = workbench.start(
-        "demo",
-        &["demo", "--duration", &duration, "--headless", "--json"],
+    let demo = demo(
+        workbench,
+        &format!("--duration {duration_s} --headless --json"),
     );
     let ended = demo.end(START_LIMIT + Duration::from_secs(duration_s) + END_LIMIT);
     assert!(ended.status.success(), "{}", ended.status);
@@ -111,20 +116,9 @@ fn run(workbench: &TestWorkbench, adapter: &Result<(), String>, duration_s: u64)
 #[test]
 fn ctrl_c_ends_the_demo_and_its_children() {
     let workbench = TestWorkbench::new(PROGRAM);
-    let mut demo = workbench.start(
-        "demo",
-        &[
-            "demo",
-            "--headless",
-            "--json",
-            "--bridge",
-            "--transport",
-            "quic",
-            "--scene",
-            "sphere-on-plane",
-        ],
-    );
-    demo.line_after("serving on ", START_LIMIT);
+    let arguments = "--headless --json --bridge --transport quic --scene sphere-on-plane";
+    let mut demo = demo(&workbench, arguments);
+    demo.line_after("serving on ");
     assert!(demo.is_running());
     demo.interrupt();
     // `end` also fails when a child outlives the demo.
@@ -136,18 +130,9 @@ fn ctrl_c_ends_the_demo_and_its_children() {
 #[test]
 fn a_demo_that_is_killed_takes_its_children_along() {
     let workbench = TestWorkbench::new(PROGRAM);
-    let mut demo = workbench.start(
-        "demo",
-        &[
-            "demo",
-            "--headless",
-            "--no-monitor",
-            "--bridge",
-            "--scene",
-            "sphere-on-plane",
-        ],
-    );
-    demo.line_after("serving on ", START_LIMIT);
+    let arguments = "--headless --no-monitor --bridge --scene sphere-on-plane";
+    let mut demo = demo(&workbench, arguments);
+    demo.line_after("serving on ");
     wait_for("children of the demo", START_LIMIT, || {
         (children(demo.id()) > 0).then_some(())
     });

@@ -12,9 +12,10 @@ use taut_link::{
 };
 use taut_proto::barrier::FRAMES_LEFT_OUT;
 use taut_tests::patience::wait_for;
-use taut_tests::process::Process;
 use taut_tests::workbench::TestWorkbench;
 use tokio::runtime::Runtime;
+
+use crate::support::{SMALL, draws};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 /// Longest wait for a node that joins or frames that are shown: a debug build on a busy machine.
@@ -106,19 +107,11 @@ impl Drop for Witness {
     }
 }
 
-fn wait_for_words(process: &mut Process, words: &str) {
-    wait_for(&format!("\"{words}\""), LIMIT, || {
-        assert!(process.is_running(), "a node ended");
-        process.stderr().contains(words).then_some(())
-    });
-}
-
 #[test]
 fn nodes_go_on_swapping_together_when_the_server_and_then_their_leader_are_killed() {
     let mut workbench = TestWorkbench::new(PROGRAM);
     workbench.log = Some("warn,taut=info");
-    if let Err(why) = workbench.adapter() {
-        taut_test_kit::left_out(why);
+    if !draws(&workbench) {
         return;
     }
     workbench.set("scene", "sphere-on-plane");
@@ -127,21 +120,10 @@ fn nodes_go_on_swapping_together_when_the_server_and_then_their_leader_are_kille
     // A node leads after three tenths of this: more than a busy machine starves the server for.
     workbench.set("network.node_timeout", 4.0);
     let mut server = workbench.serve(&[]);
-    let small = [
-        "--headless",
-        "--width",
-        "64",
-        "--height",
-        "64",
-        "--fps",
-        RATE,
-    ];
-    let node = |name: &str| {
-        let process = workbench.join("render", name, &server, &small);
-        let line = format!("{name} joined");
-        wait_for(&line, LIMIT, || {
-            server.process.stderr().contains(&line).then_some(())
-        });
+    let slow = [&SMALL[..], &["--fps", RATE]].concat();
+    let mut node = |name: &str| {
+        let process = workbench.join("render", name, &server, &slow);
+        server.process.line_with(&[&format!("{name} joined")], 1);
         process
     };
     // In the order in which they will lead.
@@ -154,18 +136,17 @@ fn nodes_go_on_swapping_together_when_the_server_and_then_their_leader_are_kille
     let led_from = witness.status().frame + FRAMES_LEFT_OUT / 2;
 
     server.process.kill();
-    wait_for_words(&mut front, LEADS);
+    front.line_with(&[LEADS], 1);
     // All three stay members only as long as they draw and arrive.
     witness.show("frames without the server", led_from, 3);
     assert!(!table.stderr().contains(LEADS), "one leads");
 
     let led_from = witness.status().frame + FRAMES_LEFT_OUT / 2;
     front.kill();
-    wait_for_words(&mut table, LEADS);
+    table.line_with(&[LEADS], 1);
     witness.show("frames without the first leader", led_from, 2);
 
-    let at = ["--quic", server.quic.as_str(), "--udp", server.udp.as_str()];
-    let again = workbench.serve_as("server-again", &at);
+    let again = workbench.serve_again(&server.quic, &server.udp);
     wait_for("the witness in the next session", LIMIT, || {
         let status = witness.status();
         (status.synchronised && status.frame < led_from).then_some(())

@@ -4,8 +4,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use taut_tests::patience::wait_for;
-use taut_tests::workbench::{Server, TestWorkbench};
+use taut_tests::workbench::TestWorkbench;
 use toml::{Table, Value};
+
+use crate::support::{SMALL, draws};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 /// Longest wait for what takes a second: a debug build on a busy machine.
@@ -20,18 +22,6 @@ fn scene(color: &str, friction: f64) -> String {
     )
 }
 
-fn wait_for_lines(server: &mut Server, words: &str, count: usize) {
-    wait_for(&format!("\"{words}\" ({count} times)"), LIMIT, || {
-        assert!(server.process.is_running(), "the server ended");
-        let log = server.process.stderr();
-        (log.matches(words).count() >= count).then_some(())
-    });
-}
-
-fn draws(workbench: &TestWorkbench) -> bool {
-    workbench.adapter().map_err(taut_test_kit::left_out).is_ok()
-}
-
 fn pictures(folder: &Path) -> usize {
     std::fs::read_dir(folder).map_or(0, Iterator::count)
 }
@@ -44,22 +34,14 @@ fn nodes_follow_a_scene_that_is_edited_and_one_that_is_wrong_changes_nothing() {
     }
     workbench.log = Some("warn,taut=info");
     let file = workbench.write("edited.toml", scene("#c03030", 0.2));
-    workbench.set("scene", file.display().to_string());
+    workbench.set("scene", file);
     let mut server = workbench.serve(&["--follow-scene"]);
     let drawn = workbench.directory().join("pictures");
     let out = drawn.display().to_string();
     // Without --stay: it is no end of the server.
-    let small = [
-        "--headless",
-        "--width",
-        "64",
-        "--height",
-        "64",
-        "--out",
-        &out,
-    ];
+    let small = [&SMALL[..], &["--out", &out]].concat();
     let node = workbench.join("render", "front", &server, &small);
-    wait_for_lines(&mut server, "front joined", 1);
+    server.process.line_with(&["front joined"], 1);
     wait_for("a picture", LIMIT, || (pictures(&drawn) > 0).then_some(()));
 
     // A fault of the file, and one that only shows when a session is to begin: the ball starts within the block.
@@ -67,18 +49,22 @@ fn nodes_follow_a_scene_that_is_edited_and_one_that_is_wrong_changes_nothing() {
         "edited.toml",
         "name = \"edited\"\n[god_object]\nmass = -1\n",
     );
-    wait_for_lines(&mut server, "the changed scene is not taken", 1);
+    server
+        .process
+        .line_with(&["the changed scene is not taken"], 1);
     let within = scene("#c03030", 0.2).replace("0.0, 0.0, 0.05", "0.0, 0.0, 0.03");
     workbench.write("edited.toml", within);
-    wait_for_lines(&mut server, "the changed scene is not taken", 2);
+    server
+        .process
+        .line_with(&["the changed scene is not taken"], 2);
     let before = pictures(&drawn);
     wait_for("it goes on", LIMIT, || {
         (pictures(&drawn) > before + 2).then_some(())
     });
 
     workbench.write("edited.toml", scene("#30c030", 0.5));
-    wait_for_lines(&mut server, "is taken: the force fades", 1);
-    wait_for_lines(&mut server, "front joined", 2);
+    server.process.line_with(&["is taken: the force fades"], 1);
+    server.process.line_with(&["front joined"], 2);
     let before = pictures(&drawn);
     wait_for("pictures of the new scene", LIMIT, || {
         (pictures(&drawn) > before + 2).then_some(())
@@ -86,8 +72,8 @@ fn nodes_follow_a_scene_that_is_edited_and_one_that_is_wrong_changes_nothing() {
     // Another scene by its name in the workbench file.
     workbench.set("scene", "peg-in-a-hole");
     workbench.save();
-    wait_for_lines(&mut server, "is taken: the force fades", 2);
-    wait_for_lines(&mut server, "front joined", 3);
+    server.process.line_with(&["is taken: the force fades"], 2);
+    server.process.line_with(&["front joined"], 3);
     let report = node.leave();
     assert!(report.contains("sessions: 3"), "{report}");
     let report = server.stop();
@@ -99,16 +85,16 @@ fn a_bridge_follows_to_a_scene_in_which_its_body_starts_elsewhere() {
     let mut workbench = TestWorkbench::new(PROGRAM);
     workbench.log = Some("warn,taut=info");
     let file = workbench.write("edited.toml", scene("#c03030", 0.2));
-    workbench.set("scene", file.display().to_string());
+    workbench.set("scene", file);
     let remote = Table::from_iter([("kind".to_owned(), Value::from("remote"))]);
     workbench.set("device", remote);
     let mut server = workbench.serve(&["--follow-scene"]);
     let bridge = workbench.join("bridge", "bridge", &server, &["--json"]);
-    wait_for_lines(&mut server, "bridge joined as", 1);
+    server.process.line_with(&["bridge joined as"], 1);
     let elsewhere = scene("#c03030", 0.2).replace("0.0, 0.0, 0.05", "0.02, 0.0, 0.06");
     workbench.write("edited.toml", elsewhere);
-    wait_for_lines(&mut server, "is taken: the force fades", 1);
-    wait_for_lines(&mut server, "bridge joined as", 2);
+    server.process.line_with(&["is taken: the force fades"], 1);
+    server.process.line_with(&["bridge joined as"], 2);
     wait_for("the bridge says so", LIMIT, || {
         let said = bridge.stderr();
         said.contains("joined another scene (edited)").then_some(())

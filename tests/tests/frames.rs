@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use taut_tests::workbench::TestWorkbench;
 
+use crate::support::draws;
+
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 /// Frames per second that each node is made for: what software draws beside other tests.
 const RATE: &str = "8";
@@ -17,8 +19,7 @@ const FRAMES_LIMIT: Duration = Duration::from_secs(60);
 /// The report of a server whose two nodes have shown their frames; `None`, said aloud, without an adapter.
 fn frames_of_two_nodes(swap: &str) -> Option<serde_json::Value> {
     let mut workbench = TestWorkbench::new(PROGRAM);
-    if let Err(reason) = workbench.adapter() {
-        taut_test_kit::left_out(reason);
+    if !draws(&workbench) {
         return None;
     }
     workbench.set("scene", "sphere-on-plane");
@@ -26,24 +27,9 @@ fn frames_of_two_nodes(swap: &str) -> Option<serde_json::Value> {
     // Slower than this a node would swap on its own, and there would be nothing to compare.
     workbench.set("frames.least_rate", LEAST_RATE);
     let server = workbench.serve(&[]);
-    let nodes = ["front", "table"].map(|node| {
-        workbench.join(
-            "render",
-            node,
-            &server,
-            &[
-                "--headless",
-                "--width",
-                "120",
-                "--height",
-                "80",
-                "--fps",
-                RATE,
-                "--frames",
-                FRAMES,
-            ],
-        )
-    });
+    let size = ["--headless", "--width", "120", "--height", "80"];
+    let arguments = [&size[..], &["--fps", RATE, "--frames", FRAMES]].concat();
+    let nodes = ["front", "table"].map(|node| workbench.join("render", node, &server, &arguments));
     for node in nodes {
         let ended = node.end(FRAMES_LIMIT);
         assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);

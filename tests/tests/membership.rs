@@ -4,13 +4,15 @@
 
 use std::time::{Duration, Instant};
 
-use taut_link::{ClientLink, ClientOptions, Role, connect};
+use taut_link::{ClientLink, Role};
 use taut_network_tests::bench::reading;
 use taut_proto::InputSample;
 use taut_tests::patience::wait_for;
 use taut_tests::process::Process;
 use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
 use tokio::runtime::Runtime;
+
+use crate::support::{SMALL, draws};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 const SCENE: &str = "sphere-on-plane";
@@ -26,8 +28,6 @@ const ZERO_FORCE_MS: f64 = 120.0;
 
 /// Datagrams that a client sends with the keys of an epoch that is over.
 const OLD_DATAGRAMS: u64 = 50;
-
-const SMALL: [&str; 5] = ["--headless", "--width", "64", "--height", "64"];
 
 /// The number before `unit` in a report's sentence.
 fn number_before(report: &str, unit: &str) -> f64 {
@@ -57,38 +57,8 @@ fn telling_workbench() -> TestWorkbench {
     workbench
 }
 
-fn draws(workbench: &TestWorkbench) -> bool {
-    match workbench.adapter() {
-        Ok(()) => true,
-        Err(why) => {
-            taut_test_kit::left_out(why);
-            false
-        }
-    }
-}
-
 fn node(workbench: &TestWorkbench, name: &str, server: &Server, more: &[&str]) -> Process {
     workbench.join("render", name, server, &[&SMALL, more].concat())
-}
-
-/// Waits until the log of a server has a line with both parts for the `count`-th time; the last of them.
-fn wait_for_lines(server: &mut Server, parts: [&str; 2], count: usize) -> String {
-    let what = format!("\"{} .. {}\" ({count} times)", parts[0], parts[1]);
-    wait_for(&what, JOIN_LIMIT, || {
-        assert!(server.process.is_running(), "the server ended");
-        let log = server.process.stderr();
-        let lines = log
-            .lines()
-            .filter(|line| parts.iter().all(|part| line.contains(part)));
-        let lines: Vec<&str> = lines.collect();
-        (lines.len() >= count).then(|| lines[count - 1].to_owned())
-    })
-}
-
-/// The same server again, at the same addresses.
-fn serve_again(workbench: &TestWorkbench, name: &str, before: &Server) -> Server {
-    let at = ["--quic", &before.quic, "--udp", &before.udp];
-    workbench.serve_as(name, &at)
 }
 
 #[test]
@@ -102,13 +72,15 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
     let mut server = workbench.serve(&[]);
     let steady = node(&workbench, "table", &server, &[]);
     let mut victim = node(&workbench, "front", &server, &[]);
-    wait_for_lines(&mut server, ["table joined", ""], 1);
-    wait_for_lines(&mut server, ["front joined", ""], 1);
+    server.process.line_with(&["table joined"], 1);
+    server.process.line_with(&["front joined"], 1);
     std::thread::sleep(Duration::from_secs(1));
 
     let killed = Instant::now();
     victim.kill();
-    let line = wait_for_lines(&mut server, ["front", "left: it was silent"], 1);
+    let line = server
+        .process
+        .line_with(&["front", "left: it was silent"], 1);
     println!(
         "killed: evicted after {} ms of silence, told {:?} after the kill",
         number_before(&line, " ms"),
@@ -121,11 +93,13 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
 
     // Its name is free: the same node again.
     let victim = node(&workbench, "front", &server, &[]);
-    wait_for_lines(&mut server, ["front joined", ""], 2);
+    server.process.line_with(&["front joined"], 2);
     std::thread::sleep(Duration::from_secs(1));
     victim.pause();
     let paused = Instant::now();
-    let line = wait_for_lines(&mut server, ["front", "left: it was silent"], 2);
+    let line = server
+        .process
+        .line_with(&["front", "left: it was silent"], 2);
     println!(
         "stopped: evicted after {} ms of silence, told {:?} after the stop",
         number_before(&line, " ms"),
@@ -134,7 +108,7 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
     std::thread::sleep(Duration::from_millis(300));
     victim.resume();
     let resumed = Instant::now();
-    wait_for_lines(&mut server, ["front joined", ""], 3);
+    server.process.line_with(&["front joined"], 3);
     println!(
         "joined again, told {:?} after it went on",
         resumed.elapsed()
@@ -156,21 +130,10 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
     assert_eq!(frames["mismatches"], 0, "{frames}");
 }
 
-fn observe(
-    runtime: &Runtime,
-    workbench: &TestWorkbench,
-    server: &Server,
-    node: &str,
-) -> ClientLink {
-    let options = ClientOptions::new(server.quic.clone(), workbench.key(), Role::Observer, node);
-    runtime
-        .block_on(connect(options))
-        .unwrap_or_else(|error| panic!("{error}"))
-}
-
 /// Waits until a state says that the hand feels more than a newton.
 fn wait_for_force(runtime: &Runtime, workbench: &TestWorkbench, server: &Server) {
-    let link = observe(runtime, workbench, server, "watcher");
+    let link = workbench.connect(runtime, server, Role::Observer, "watcher");
+    let link = link.unwrap_or_else(|error| panic!("{error}"));
     let mut states = Vec::new();
     wait_for("a force", JOIN_LIMIT, || {
         states.clear();
@@ -218,22 +181,23 @@ fn a_killed_servers_force_is_gone_and_everybody_joins_the_next_one() {
     let runtime = Runtime::new().expect("a runtime");
     wait_for_force(&runtime, &workbench, &server);
     // A client of the old epoch, that keeps its keys.
-    let old = observe(&runtime, &workbench, &server, "of-the-old-epoch");
+    let old = workbench.connect(&runtime, &server, Role::Observer, "of-the-old-epoch");
+    let old = old.unwrap_or_else(|error| panic!("{error}"));
     wait_for("a state", JOIN_LIMIT, || {
         (old.counters().states > 0).then_some(())
     });
 
     server.process.kill();
     std::thread::sleep(Duration::from_secs(2));
-    let mut again = serve_again(&workbench, "server-again", &server);
+    let mut again = workbench.serve_again(&server.quic, &server.udp);
     let serving = Instant::now();
-    wait_for_lines(&mut again, ["bridge joined", ""], 1);
+    again.process.line_with(&["bridge joined"], 1);
     println!(
         "the bridge joined, told {:?} after the start",
         serving.elapsed()
     );
     if drawing {
-        wait_for_lines(&mut again, ["front joined", ""], 1);
+        again.process.line_with(&["front joined"], 1);
         println!(
             "the node joined, told {:?} after the start",
             serving.elapsed()
@@ -261,26 +225,24 @@ fn a_killed_servers_force_is_gone_and_everybody_joins_the_next_one() {
 fn a_server_that_stops_ends_its_nodes_unless_they_are_to_stay() {
     let mut workbench = telling_workbench();
     let drawing = draws(&workbench);
-    let (server, bridge) = workbench.serve_with_bridge(SCENE, &["--stay"]);
-    let mut server = server;
-    wait_for_lines(&mut server, ["bridge joined", ""], 1);
+    let (mut server, bridge) = workbench.serve_with_bridge(SCENE, &["--stay"]);
+    server.process.line_with(&["bridge joined"], 1);
     let nodes = drawing.then(|| {
         let ends = node(&workbench, "front", &server, &[]);
         let stays = node(&workbench, "table", &server, &["--stay"]);
-        wait_for_lines(&mut server, ["front joined", ""], 1);
-        wait_for_lines(&mut server, ["table joined", ""], 1);
+        server.process.line_with(&["front joined"], 1);
+        server.process.line_with(&["table joined"], 1);
         (ends, stays)
     });
     let (quic, udp) = (server.quic.clone(), server.udp.clone());
     server.stop();
-    let at = ["--quic", quic.as_str(), "--udp", udp.as_str()];
-    let mut again = workbench.serve_as("server-again", &at);
-    wait_for_lines(&mut again, ["bridge joined", ""], 1);
+    let mut again = workbench.serve_again(&quic, &udp);
+    again.process.line_with(&["bridge joined"], 1);
     if let Some((ends, stays)) = nodes {
         let ended = ends.end(END_LIMIT);
         assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
         assert_eq!(number_after(&ended.stdout, "sessions: "), 1.0);
-        wait_for_lines(&mut again, ["table joined", ""], 1);
+        again.process.line_with(&["table joined"], 1);
         let report = stays.leave();
         assert_eq!(number_after(&report, "sessions: "), 2.0, "{report}");
     }
@@ -324,8 +286,8 @@ fn a_node_that_starts_again_fetches_no_mesh_and_one_that_comes_to_another_scene_
     wait_for("a picture", JOIN_LIMIT, || (drawn() > 0).then_some(()));
     server.process.kill();
     workbench.set("scene", "peg-in-a-hole");
-    let mut again = serve_again(&workbench, "server-again", &server);
-    wait_for_lines(&mut again, ["front joined", ""], 1);
+    let mut again = workbench.serve_again(&server.quic, &server.udp);
+    again.process.line_with(&["front joined"], 1);
     let before = drawn();
     wait_for("pictures of the other scene", JOIN_LIMIT, || {
         (drawn() > before + 2).then_some(())

@@ -3,10 +3,10 @@
 //! Poses are checked for penetration by code that shares nothing with the method. Source: Ortega et al. 2007, Figures 10 to 12.
 
 use nalgebra::Vector3;
+use taut_bridge::{MinJerkPath, ViaPoint};
 use taut_method_tests::checker::PenetrationChecker;
 use taut_method_tests::motion::{Sample, lead, shipped};
 use taut_scene::{BuiltScene, data_file};
-use taut_tests::motion::{intention, sampled};
 
 /// Stiffness that the hand feels in the shipped scenes, N/m.
 const STIFFNESS: f64 = 1000.0;
@@ -18,6 +18,23 @@ const DEPTH: f64 = 0.006;
 const NO_FORCE: f64 = 1e-6;
 /// Half the length of the shipped peg, and of the box with the hole, m.
 const HALF_LENGTH: f64 = 0.030;
+
+/// The scene's hand goes where it intends to, `rate_hz` times a second, for `duration`, s.
+fn led(scene: &BuiltScene, rate_hz: f64, duration: f64) -> Vec<Sample> {
+    let hand = scene.hand.as_ref().expect("the scene has a hand");
+    let points = hand.path.samples().iter().map(|s| ViaPoint {
+        time_s: s.time,
+        pose: s.pose,
+    });
+    let path = MinJerkPath::new(points.collect(), hand.repeat);
+    let path = path.unwrap_or_else(|error| panic!("{error}"));
+    let steps = (duration * rate_hz).round() as u64;
+    let intended = (0..=steps).map(|step| {
+        let time = step as f64 / rate_hz;
+        (time, path.at(time).0)
+    });
+    lead(scene, intended).collect()
+}
 
 /// No sample's pose penetrates, and no gap is below the least one.
 fn assert_apart(scene: &BuiltScene, samples: &[Sample], every: usize) {
@@ -164,8 +181,7 @@ fn the_peg_goes_in_and_out_and_its_axial_force_is_that_of_figure_11() {
         (288, 280)
     );
     assert!((scene.stiffness() - STIFFNESS).abs() < 1e-9);
-    let samples: Vec<Sample> =
-        lead(&scene, sampled(&intention(&scene), 1000.0, 0.0, 30.0)).collect();
+    let samples = led(&scene, 1000.0, 30.0);
     assert_apart(&scene, &samples, 5);
     let rest = scene.settings.rest_distance;
     assert_slides_on_the_top(&samples, rest);
@@ -184,8 +200,7 @@ fn two_bunnies_slide_for_ten_seconds_and_no_pair_of_triangles_ever_intersects() 
     // A slower clock than the workbench's, so that the test is short: longer steps are harder for the collision detection.
     const RATE_HZ: f64 = 125.0;
     let scene = shipped("two-bunnies");
-    let samples: Vec<Sample> =
-        lead(&scene, sampled(&intention(&scene), RATE_HZ, 0.0, 16.0)).collect();
+    let samples = led(&scene, RATE_HZ, 16.0);
     let touching = samples.iter().filter(|sample| sample.active > 0).count() as f64 / RATE_HZ;
     assert!(
         touching >= 10.0,
@@ -209,8 +224,7 @@ fn two_bunnies_slide_for_ten_seconds_and_no_pair_of_triangles_ever_intersects() 
 #[test]
 fn a_sphere_on_a_plane_feels_the_closed_form_force_and_never_loses_it() {
     let scene = shipped("sphere-on-plane");
-    let samples: Vec<Sample> =
-        lead(&scene, sampled(&intention(&scene), 1000.0, 0.0, 11.4)).collect();
+    let samples = led(&scene, 1000.0, 11.4);
     assert_apart(&scene, &samples, 5);
     let rest = scene.settings.rest_distance;
     for sample in &samples {

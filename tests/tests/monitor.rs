@@ -81,9 +81,8 @@ fn a_recorded_session_is_read_back_with_its_entities_and_its_whole_time() {
 fn a_recording_that_is_there_is_refused_or_the_next_is_beside_it() {
     let mut workbench = TestWorkbench::new(PROGRAM);
     workbench.set("scene", "sphere-on-plane");
-    let path = workbench.write("session.rrd", "precious");
-    let record = path.display().to_string();
-    let config = workbench.save().display().to_string();
+    let record = workbench.write("session.rrd", "precious");
+    let config = workbench.save();
     let key = workbench.key_path();
     let always = ["serve", "--config", &config, "--key", &key];
     let refused = workbench.run("refused", &[&always[..], &["--record", &record]].concat());
@@ -96,18 +95,16 @@ fn a_recording_that_is_there_is_refused_or_the_next_is_beside_it() {
 
     // A service that is started again has nobody to name another file.
     workbench.set("monitoring.enabled", true);
-    workbench.set("monitoring.record", record);
+    workbench.set("monitoring.record", record.clone());
     for number in [2, 3] {
         let mut server = workbench.serve(&[]);
-        let said = server
-            .process
-            .line_after("what it shows is written to ", START_LIMIT);
+        let said = server.process.line_after("what it shows is written to ");
         let name = format!("session-{number}.rrd");
         assert!(said.ends_with(&name), "{said}");
         server.stop();
         inspect(&workbench.directory().join(name)).unwrap_or_else(|error| panic!("{error}"));
     }
-    assert_eq!(std::fs::read(path).expect("there"), b"precious");
+    assert_eq!(std::fs::read(record).expect("there"), b"precious");
 }
 
 /// So that the next start finds its name free.
@@ -123,7 +120,7 @@ fn a_start_that_fails_leaves_no_recording() {
     let path = workbench.directory().join("session.rrd");
     let directory = workbench.directory().join("recording");
     let [record, recording] = [&path, &directory].map(|path| path.display().to_string());
-    let config = workbench.save().display().to_string();
+    let config = workbench.save();
     let key = workbench.key_path();
     let serve = ["serve", "--config", &config, "--key", &key];
     let wanted = [
@@ -172,9 +169,7 @@ fn the_web_viewer_s_page_is_served_while_the_session_runs() {
     workbench.set("scene", "sphere-on-plane");
     workbench.set("monitoring.enabled", true);
     let mut server = workbench.serve(&[]);
-    let page = server
-        .process
-        .line_after("watch it in a browser: ", START_LIMIT);
+    let page = server.process.line_after("watch it in a browser: ");
     let address = page
         .strip_prefix("http://")
         .and_then(|rest| rest.split(['/', '?']).next())
@@ -198,9 +193,7 @@ fn the_web_viewer_s_page_is_served_while_the_session_runs() {
     assert!(answer.contains("<html"), "no page: {answer}");
     // The page finds the stream by the address's own query.
     assert!(page.contains("url="), "{page}");
-    let mut stream = server
-        .process
-        .line_after("or in the rerun viewer: rerun ", START_LIMIT);
+    let mut stream = server.process.line_after("or in the rerun viewer: rerun ");
     stream = stream
         .split("://")
         .nth(1)

@@ -5,6 +5,8 @@ use std::path::Path;
 use image::{GenericImageView, RgbaImage};
 use taut_tests::workbench::{END_LIMIT, START_LIMIT, TestWorkbench};
 
+use crate::support::draws;
+
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 /// Pictures of each node.
 const FRAMES: u32 = 3;
@@ -12,8 +14,7 @@ const FRAMES: u32 = 3;
 #[test]
 fn both_screens_are_drawn_side_by_side_for_two_eyes() {
     let workbench = TestWorkbench::new(PROGRAM);
-    if let Err(reason) = workbench.adapter() {
-        taut_test_kit::left_out(reason);
+    if !draws(&workbench) {
         return;
     }
     let server = workbench.serve(&[]);
@@ -21,18 +22,9 @@ fn both_screens_are_drawn_side_by_side_for_two_eyes() {
     // The option is the width of one view; there is one for each eye.
     let (view_width, height) = (480_u32, 320);
     let width = 2 * view_width;
-    let size = (view_width.to_string(), height.to_string());
-    let arguments = [
-        "--headless",
-        "--frames",
-        &frames,
-        "--out",
-        "pictures",
-        "--width",
-        &size.0,
-        "--height",
-        &size.1,
-    ];
+    let [across, down] = [view_width, height].map(|pixels| pixels.to_string());
+    let size = ["--headless", "--width", &across, "--height", &down];
+    let arguments = [&size[..], &["--frames", &frames, "--out", "pictures"]].concat();
     let nodes = ["front", "table"].map(|node| workbench.join("render", node, &server, &arguments));
     for node in nodes {
         let ended = node.end(START_LIMIT + END_LIMIT);

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use taut_link::{ClientLink, ClientOptions, LinkError, Role, connect};
+use taut_link::{LinkError, Role};
 use taut_proto::control::RefusalCode;
 use taut_tests::patience::wait_for;
 use taut_tests::workbench::{Server, TestWorkbench};
@@ -12,24 +12,10 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 /// Longest wait for a file that is looked at once a second.
 const LIMIT: Duration = Duration::from_secs(30);
 
-fn join(
-    runtime: &Runtime,
-    workbench: &TestWorkbench,
-    server: &Server,
-    node: &str,
-) -> Result<ClientLink, LinkError> {
-    let options = ClientOptions::new(server.quic.clone(), workbench.key(), Role::Observer, node);
-    runtime.block_on(connect(options))
-}
-
-/// Writes the workbench file anew, and waits until the server has said a line about it for the `count`-th time.
-fn save(workbench: &TestWorkbench, server: &mut Server, text: &str, says: &str, count: usize) {
+/// Writes the workbench file anew, and waits until the server has said this about it.
+fn save(workbench: &TestWorkbench, server: &mut Server, text: &str, says: &str) {
     workbench.write("workbench.toml", text);
-    wait_for(says, LIMIT, || {
-        assert!(server.process.is_running(), "the server ended");
-        let log = server.process.stderr();
-        (log.matches(says).count() >= count).then_some(())
-    });
+    server.process.line_with(&[says], 1);
 }
 
 #[test]
@@ -38,11 +24,9 @@ fn a_name_that_is_revoked_while_the_server_runs_goes_out_and_the_others_stay() {
     workbench.set("scene", "sphere-on-plane");
     let mut server = workbench.serve(&[]);
     let runtime = Runtime::new().expect("a runtime");
-    let joined = |node| {
-        let link = join(&runtime, &workbench, &server, node);
-        link.unwrap_or_else(|error| panic!("{error}"))
-    };
-    let (lost, stays) = (joined("lost-laptop"), joined("stays"));
+    let join = |server: &Server, node| workbench.connect(&runtime, server, Role::Observer, node);
+    let [lost, stays] = ["lost-laptop", "stays"]
+        .map(|node| join(&server, node).unwrap_or_else(|error| panic!("{error}")));
 
     let before = workbench.file.to_string();
     let revoked = |entry: &str| {
@@ -58,7 +42,6 @@ fn a_name_that_is_revoked_while_the_server_runs_goes_out_and_the_others_stay() {
         &mut server,
         &revoked("*"),
         "the changed workbench file is not taken",
-        1,
     );
     assert!(lost.is_closed().is_none() && stays.is_closed().is_none());
 
@@ -67,11 +50,10 @@ fn a_name_that_is_revoked_while_the_server_runs_goes_out_and_the_others_stay() {
         &mut server,
         &revoked("lost-laptop"),
         "shut out: 1",
-        1,
     );
     wait_for("the end of the session", LIMIT, || lost.is_closed());
     assert!(lost.is_closed().is_some_and(|why| why.contains("revoked")));
-    match join(&runtime, &workbench, &server, "lost-laptop") {
+    match join(&server, "lost-laptop") {
         Err(LinkError::Refused { code, .. }) => assert_eq!(code, RefusalCode::Revoked),
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("let in"),
@@ -83,9 +65,8 @@ fn a_name_that_is_revoked_while_the_server_runs_goes_out_and_the_others_stay() {
         &mut server,
         &before,
         "nobody who is in is shut out",
-        1,
     );
-    let again = join(&runtime, &workbench, &server, "lost-laptop");
+    let again = join(&server, "lost-laptop");
     drop(again.unwrap_or_else(|error| panic!("{error}")));
     drop(stays);
     server.stop();
