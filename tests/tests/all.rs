@@ -17,6 +17,7 @@ mod method_scenes;
 mod monitor;
 mod pictures;
 mod promises;
+mod repository;
 mod revocation;
 mod soak;
 mod support;

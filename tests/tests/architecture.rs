@@ -1,14 +1,11 @@
 //! The tables of ARCHITECTURE.md say where things are: what they name is there.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+
+use crate::repository::{names, read, root};
 
 const FOLDERS: [&str; 3] = ["", "server/src", "server/method/src"];
 const MOST_STATIONS: usize = 12;
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
 
 /// The rows of the table under a heading, as cells.
 fn rows(page: &str, heading: &str) -> Vec<Vec<String>> {
@@ -20,11 +17,6 @@ fn rows(page: &str, heading: &str) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// What stands between backquotes.
-fn names(cell: &str) -> Vec<&str> {
-    cell.split('`').skip(1).step_by(2).collect()
-}
-
 fn find(path: &str) -> Option<PathBuf> {
     let places = FOLDERS.map(|folder| root().join(folder).join(path));
     places.into_iter().find(|place| place.exists())
@@ -32,7 +24,7 @@ fn find(path: &str) -> Option<PathBuf> {
 
 #[test]
 fn every_station_of_the_walks_is_a_function_of_its_file() {
-    let page = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("the page");
+    let page = read(root().join("ARCHITECTURE.md"));
     for heading in [
         "## From a device sample to the force",
         "## From a god-object pose to a lit pixel",
@@ -40,11 +32,11 @@ fn every_station_of_the_walks_is_a_function_of_its_file() {
         let rows = rows(&page, heading);
         assert_eq!(rows.len(), MOST_STATIONS, "{heading}");
         for row in rows {
-            let [file, functions @ ..] = &names(&row[2])[..] else {
+            let [file, functions @ ..] = &names(&row[2]).collect::<Vec<_>>()[..] else {
                 panic!("{row:?} names no file");
             };
             let place = find(file).unwrap_or_else(|| panic!("{file} is not there"));
-            let text = fs::read_to_string(place).expect("a source file");
+            let text = read(place);
             assert!(!functions.is_empty(), "{row:?} names no function");
             for function in functions {
                 let name = function.rsplit("::").next().unwrap_or(function);
@@ -59,11 +51,11 @@ fn every_station_of_the_walks_is_a_function_of_its_file() {
 
 #[test]
 fn whoever_wants_to_change_something_is_sent_to_a_place_that_is_there() {
-    let page = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("the page");
+    let page = read(root().join("ARCHITECTURE.md"));
     let rows = rows(&page, "## To change something, go there");
     assert!(rows.len() > 8);
     for row in rows {
-        let named = names(&row[2]);
+        let named: Vec<&str> = names(&row[2]).collect();
         let folder = named.first().and_then(|first| find(first));
         let folder = folder.unwrap_or_else(|| panic!("{row:?}: the first place is not there"));
         for place in &named[1..] {

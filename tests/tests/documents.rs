@@ -2,30 +2,9 @@
 
 use std::collections::HashMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-fn read(path: &Path) -> String {
-    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-/// Files with this ending under `folder`, but for what is built.
-fn files(folder: &Path, ending: &str, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).expect("a folder").flatten() {
-        let (path, name) = (entry.path(), entry.file_name());
-        if path.is_dir() {
-            let built = name == "target" || name.to_string_lossy().starts_with('.');
-            if !built {
-                files(&path, ending, found);
-            }
-        } else if path.extension().is_some_and(|of| of == ending) {
-            found.push(path);
-        }
-    }
-}
+use crate::repository::{files, names, read, root};
 
 /// Where the links of a page lead, without those to the web and within the page.
 fn links(page: &str) -> Vec<&str> {
@@ -51,8 +30,7 @@ fn anchor(heading: &str) -> String {
 
 #[test]
 fn every_link_leads_to_something() {
-    let mut pages = Vec::new();
-    files(&root(), "md", &mut pages);
+    let pages = files("md");
     assert!(pages.len() > 25, "{pages:?}");
     let mut broken = Vec::new();
     for page in &pages {
@@ -75,10 +53,9 @@ fn every_link_leads_to_something() {
 
 /// Packages by name: where they are, and their manifest.
 fn packages() -> HashMap<String, (PathBuf, String)> {
-    let mut manifests = Vec::new();
-    files(&root(), "toml", &mut manifests);
-    manifests.retain(|path| path.ends_with("Cargo.toml"));
-    let named = manifests.into_iter().filter_map(|path| {
+    let manifests = files("toml").into_iter();
+    let manifests = manifests.filter(|path| path.ends_with("Cargo.toml"));
+    let named = manifests.filter_map(|path| {
         let text = read(&path);
         let name = text.split("[package]\nname = \"").nth(1)?;
         let name = name.split('"').next()?.to_owned();
@@ -120,12 +97,8 @@ fn every_command_of_cargo_names_what_there_is() {
         "cargo test -p taut-bridge --test haply",
         &packages
     ));
-    let mut read_in = Vec::new();
-    for ending in ["md", "rs", "toml", "h"] {
-        files(&root(), ending, &mut read_in);
-    }
     let (mut found, mut broken) = (0, Vec::new());
-    for path in read_in {
+    for path in ["md", "rs", "toml", "h"].into_iter().flat_map(files) {
         let text = read(&path);
         for kind in ["cargo test ", "cargo run ", "cargo bench "] {
             for rest in text.split(kind).skip(1) {
@@ -144,7 +117,7 @@ fn every_command_of_cargo_names_what_there_is() {
 #[test]
 fn the_book_has_every_page_once() {
     let docs = root().join("docs");
-    let summary = read(&docs.join("SUMMARY.md"));
+    let summary = read(docs.join("SUMMARY.md"));
     let mut named = links(&summary);
     named.sort_unstable();
     let mut there: Vec<String> = fs::read_dir(&docs)
@@ -159,9 +132,8 @@ fn the_book_has_every_page_once() {
 
 #[test]
 fn every_picture_is_shown_or_made_for_one_that_is() {
-    let mut pages = Vec::new();
-    files(&root(), "md", &mut pages);
-    let all: String = pages.iter().map(|page| read(page)).collect();
+    let pages = files("md");
+    let all: String = pages.iter().map(read).collect();
     let pictures = fs::read_dir(root().join("docs/pictures")).expect("pictures");
     for name in pictures.flatten().map(|entry| entry.file_name()) {
         let name = name.to_string_lossy();
@@ -172,18 +144,14 @@ fn every_picture_is_shown_or_made_for_one_that_is() {
 
 #[test]
 fn words_of_the_glossary_are_those_of_the_code() {
-    let page = read(&root().join("docs/glossary.md"));
-    let mut sources = Vec::new();
-    files(&root(), "rs", &mut sources);
-    let code: String = sources
-        .iter()
-        .filter(|path| !path.ends_with("documents.rs"))
-        .map(|path| read(path))
-        .collect();
+    let page = read(root().join("docs/glossary.md"));
+    let sources = files("rs").into_iter();
+    let others = sources.filter(|path| !path.ends_with("documents.rs"));
+    let code: String = others.map(read).collect();
     let mut words = 0;
     for row in page.lines().filter(|line| line.starts_with("| ")) {
         let cell = row.split('|').nth(2).unwrap_or_default();
-        for name in cell.split('`').skip(1).step_by(2) {
+        for name in names(cell) {
             words += 1;
             assert!(code.contains(name), "{name} is not in the code: {row}");
         }
@@ -193,7 +161,7 @@ fn words_of_the_glossary_are_those_of_the_code() {
 
 #[test]
 fn the_papers_sections_lead_to_files() {
-    let page = read(&root().join("server/method/REFERENCES.md"));
+    let page = read(root().join("server/method/REFERENCES.md"));
     let (_, section) = page
         .split_once("## The paper's sections and our files")
         .expect("the heading");
@@ -201,7 +169,7 @@ fn the_papers_sections_lead_to_files() {
     let mut paths = 0;
     for row in section.lines().filter(|line| line.contains("`src/")) {
         let cell = row.split('|').nth(2).unwrap_or_default();
-        for path in cell.split('`').skip(1).step_by(2) {
+        for path in names(cell) {
             paths += 1;
             let file = root().join("server/method").join(path);
             assert!(file.exists(), "{path} is not there: {row}");

@@ -1,10 +1,10 @@
 //! The tables of promises in the documents: what a row says keeps a promise is there, and so is the test that it names.
 
 use std::collections::BTreeSet;
-use std::fs;
-use std::path::{Path, PathBuf};
 
 use taut_network_tests::hostile::attacks;
+
+use crate::repository::{everything, names, read, root};
 
 const PAGES: [&str; 4] = [
     "docs/safety.md",
@@ -15,10 +15,6 @@ const PAGES: [&str; 4] = [
 /// Fewest rows of all tables: a table that is not found has none.
 const FEWEST_ROWS: usize = 80;
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
 /// What the repository has: paths from its root, and the names of its tests.
 struct Repository {
     paths: BTreeSet<String>,
@@ -27,30 +23,15 @@ struct Repository {
 
 impl Repository {
     fn read() -> Repository {
-        let mut found = Repository {
-            paths: BTreeSet::new(),
-            tests: BTreeSet::new(),
-        };
-        found.walk(&root(), "");
-        found
-    }
-
-    fn walk(&mut self, folder: &Path, place: &str) {
-        for entry in fs::read_dir(folder).expect("a folder").flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let built = name == "target" || name.starts_with('.');
-            if built {
-                continue;
+        let (mut paths, mut tests) = (BTreeSet::new(), BTreeSet::new());
+        for path in everything() {
+            if path.is_file() && path.extension().is_some_and(|of| of == "rs") {
+                tests.extend(tests_of(&read(&path)));
             }
-            let (path, place) = (entry.path(), format!("{place}/{name}"));
-            if path.is_dir() {
-                self.walk(&path, &place);
-            } else if name.ends_with(".rs") {
-                let text = fs::read_to_string(&path).expect("a source file");
-                self.tests.extend(tests_of(&text));
-            }
-            self.paths.insert(place);
+            let place = path.strip_prefix(root()).expect("it is in it");
+            paths.insert(format!("/{}", place.display()));
         }
+        Repository { paths, tests }
     }
 
     /// Whether there is this file or folder; its beginning may be left out.
@@ -82,10 +63,7 @@ fn taut_tests_in(name: &str, repository: &Repository) -> bool {
                 .paths
                 .iter()
                 .filter(|path| path.ends_with(&format!("/{name}")))
-                .any(|path| {
-                    let text = fs::read_to_string(root().join(&path[1..])).expect("a file");
-                    !tests_of(&text).is_empty()
-                }))
+                .any(|path| !tests_of(&read(root().join(&path[1..]))).is_empty()))
 }
 
 /// Names of the functions that have an attribute of a test, or are within `proptest!`.
@@ -127,10 +105,9 @@ fn rows(page: &str) -> Vec<[String; 3]> {
         .collect()
 }
 
-/// What stands between backticks.
+/// What stands between backquotes, with several each for its own.
 fn words(cell: &str) -> Vec<String> {
-    let odd = cell.split('`').skip(1).step_by(2);
-    odd.flat_map(several).collect()
+    names(cell).flat_map(several).collect()
 }
 
 /// `a/{b,c}.rs` is two files.
@@ -150,7 +127,7 @@ fn every_promise_names_a_place_and_a_test_that_are_there() {
     let repository = Repository::read();
     let (mut count, mut missing) = (0, Vec::new());
     for page in PAGES {
-        let text = fs::read_to_string(root().join(page)).expect("a page");
+        let text = read(root().join(page));
         for [promise, kept, test] in rows(&text) {
             count += 1;
             let mut tests = words(&test);
@@ -184,9 +161,7 @@ fn every_promise_names_a_place_and_a_test_that_are_there() {
 
 #[test]
 fn every_attack_stands_beside_a_promise() {
-    let tables: String = PAGES
-        .map(|page| fs::read_to_string(root().join(page)).expect("a page"))
-        .concat();
+    let tables = PAGES.map(|page| read(root().join(page))).concat();
     for attack in attacks() {
         let named = format!("`{}`", attack.name);
         assert!(
