@@ -316,29 +316,13 @@ mod tests {
     use super::*;
     use crate::session::head::heads;
     use crate::session::state_events::BUTTON_SHIFT;
+    use crate::shared::contact_snapshot::constraint;
     use crate::shared::device_state::SafetyState;
     use crate::shared::fanout::Publisher;
     use crate::shared::{contact_snapshot, device_state, wrench_command};
-    use god_object::constraint::{Feature, FeaturePair};
     use taut_bridge::{EventKind, SafetyEvent};
     use taut_proto::state::event_code;
     use taut_scene::{HeadTracking, Viewer, Workbench};
-
-    fn constraint(obstacle: u16, gap: f64) -> NonPenetrationConstraint {
-        NonPenetrationConstraint {
-            features: FeaturePair {
-                obstacle,
-                on_body: Feature::Vertex(0),
-                on_obstacle: Feature::Face(u32::from(obstacle)),
-            },
-            point: Point3::new(gap, 0.0, 0.0),
-            normal: Vector3::z(),
-            gap,
-            separation: Default::default(),
-            obstacle_displacement: Vector3::zeros(),
-            shading_normal: None,
-        }
-    }
 
     /// A port in full force that has just limited one.
     fn armed_after_a_limit() -> SafetyState {

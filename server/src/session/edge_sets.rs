@@ -167,6 +167,7 @@ mod tests {
     use taut_proto::{Assembler, PartTaken};
 
     use super::*;
+    use crate::shared::contact_snapshot::constraint;
 
     /// What is known after the update at `ms`: a plate comes up by 0.1 mm in each.
     fn plate(ms: u64, rows: u32) -> ContactSnapshot {
@@ -182,11 +183,8 @@ mod tests {
                 on_obstacle: Feature::Face(0),
             },
             point: Point3::new(0.01, 0.0, 1e-4 * ms as f64),
-            normal: Vector3::z(),
-            gap: 1e-3,
-            separation: Default::default(),
             obstacle_displacement: Vector3::z() * 1e-4,
-            shading_normal: None,
+            ..constraint(3, 1e-3)
         };
         snapshot.set.constraints.extend((0..rows).map(row));
         snapshot

@@ -88,3 +88,24 @@ pub fn channel<const READERS: usize>(
 ) {
     fanout(&ContactSnapshot::at_start(start, capacity))
 }
+
+/// A constraint of this obstacle with this gap, straight up, for tests.
+#[cfg(test)]
+pub(crate) fn constraint(obstacle: u16, gap: f64) -> god_object::NonPenetrationConstraint {
+    use god_object::constraint::{Feature, FeaturePair};
+    use god_object::nalgebra::{Point3, Vector3};
+
+    god_object::NonPenetrationConstraint {
+        features: FeaturePair {
+            obstacle,
+            on_body: Feature::Vertex(0),
+            on_obstacle: Feature::Face(u32::from(obstacle)),
+        },
+        point: Point3::new(gap, 0.0, 0.0),
+        normal: Vector3::z(),
+        gap,
+        separation: Default::default(),
+        obstacle_displacement: Vector3::zeros(),
+        shading_normal: None,
+    }
+}

@@ -185,8 +185,7 @@ impl EventLog {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use god_object::constraint::{Feature, FeaturePair, NonPenetrationConstraint};
-    use god_object::nalgebra::{Point3, Vector3};
+    use crate::shared::contact_snapshot::constraint;
     use god_object::spatial::Pose;
     use taut_bridge::SafetyEvent;
 
@@ -211,19 +210,7 @@ mod tests {
         /// Looks `at_ms` with this gap to the table; what is said then.
         fn look(&mut self, at_ms: u64, gap: f64) -> Vec<String> {
             let mut contacts = ContactSnapshot::at_start(&Pose::identity(), 4);
-            contacts.set.constraints.push(NonPenetrationConstraint {
-                features: FeaturePair {
-                    obstacle: 1,
-                    on_body: Feature::Vertex(0),
-                    on_obstacle: Feature::Face(0),
-                },
-                point: Point3::origin(),
-                normal: Vector3::z(),
-                gap,
-                separation: Default::default(),
-                obstacle_displacement: Vector3::zeros(),
-                shading_normal: None,
-            });
+            contacts.set.constraints.push(constraint(1, gap));
             let before = self.lines.len();
             let lines = &mut self.lines;
             self.log.follow(
