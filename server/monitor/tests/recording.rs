@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use taut_monitor::{
     BodyRole, InspectError, LogLevel, Monitor, MonitorBody, MonitorError, MonitorOptions,
-    MonitorSample, MonitorScene, MonitorScreen, Pose, ShownContact, inspect,
+    MonitorSample, MonitorScene, MonitorScreen, MonitorSender, MonitorStats, Pose, RrdSummary,
+    ShownContact, inspect,
 };
 
 /// Samples are one picture period and a bit apart, so that several pictures are drawn.
@@ -68,23 +69,38 @@ fn recording_only(path: &std::path::Path) -> MonitorOptions {
     }
 }
 
-#[test]
-fn a_recorded_stream_is_read_back_with_its_entities_and_times() {
+/// What is in a recording of this scene of what `show` tells the monitor, and what the monitor says of it.
+fn recorded(
+    scene: MonitorScene,
+    show: impl FnOnce(&Monitor, &mut MonitorSender),
+) -> (RrdSummary, MonitorStats) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("session.rrd");
-    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene()).unwrap();
-    assert_eq!(monitor.address(), None);
-    for index in 0..SAMPLES {
-        assert!(sender.offer(sample(index)));
+    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene).unwrap();
+    show(&monitor, &mut sender);
+    let stats = monitor.stop().unwrap();
+    (inspect(&path).unwrap(), stats)
+}
+
+/// Offers these one after the other, so that several pictures are drawn.
+fn offer(sender: &mut MonitorSender, samples: impl Iterator<Item = MonitorSample>) {
+    for sample in samples {
+        assert!(sender.offer(sample));
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
-    sender.log(SAMPLE_PERIOD_NS, LogLevel::Warn, "said by a loop");
-    monitor.log(LogLevel::Info, "said by the server");
-    let stats = monitor.stop().unwrap();
+}
+
+#[test]
+fn a_recorded_stream_is_read_back_with_its_entities_and_times() {
+    let (summary, stats) = recorded(scene(), |monitor, sender| {
+        assert_eq!(monitor.address(), None);
+        offer(sender, (0..SAMPLES).map(sample));
+        sender.log(SAMPLE_PERIOD_NS, LogLevel::Warn, "said by a loop");
+        monitor.log(LogLevel::Info, "said by the server");
+    });
     assert_eq!(stats.samples_shown, SAMPLES);
     assert_eq!(stats.samples_dropped, 0);
 
-    let summary = inspect(&path).unwrap();
     for entity in [
         "/log",
         "/plots/constraint_age",
@@ -129,10 +145,7 @@ fn a_recorded_stream_is_read_back_with_its_entities_and_times() {
 
 #[test]
 fn a_peak_of_a_millisecond_between_two_samples_is_in_the_recording() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("session.rrd");
-    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene()).unwrap();
-    for index in 0..SAMPLES {
+    let with_peak = |index| {
         let mut sample = sample(index);
         for tick in 0..20 {
             let is_peak = (index, tick) == (31, 13);
@@ -140,11 +153,13 @@ fn a_peak_of_a_millisecond_between_two_samples_is_in_the_recording() {
             let wrench = Vector6::new(0.0, 0.0, force, 0.0, if is_peak { -0.4 } else { 0.1 }, 0.0);
             sample.between.add(&wrench, 900.0);
         }
-        assert!(sender.offer(sample));
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    assert_eq!(monitor.stop().unwrap().samples_dropped, 0);
-    let summary = inspect(&path).unwrap();
+        sample
+    };
+    let show = |_: &Monitor, sender: &mut MonitorSender| {
+        offer(sender, (0..SAMPLES).map(with_peak));
+    };
+    let (summary, stats) = recorded(scene(), show);
+    assert_eq!(stats.samples_dropped, 0);
     assert_eq!(summary.numbers["/plots/force"], (0.0, 17.5));
     assert_eq!(summary.numbers["/plots/torque"], (-0.4, 0.4));
     assert_eq!(summary.numbers["/plots/constraint_age"], (0.0, 900.0));
@@ -152,26 +167,24 @@ fn a_peak_of_a_millisecond_between_two_samples_is_in_the_recording() {
 
 #[test]
 fn an_obstacle_that_moves_is_recorded_with_every_picture_and_one_at_rest_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("session.rrd");
     let mut scene = scene();
     scene.bodies[1].name = "wall".into();
     scene
         .bodies
         .push(tetrahedron("plate", BodyRole::MovingObstacle));
-    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene).unwrap();
-    for index in 0..SAMPLES {
+    let moved = |index| {
         let mut sample = sample(index);
         let up = Isometry3::translation(0.0, 0.0, 1e-3 * index as f64);
         // The wall is at rest, and 7 is none of the scene's.
         for obstacle in [1, 0, 7] {
             assert!(sample.moving.push(obstacle, up));
         }
-        assert!(sender.offer(sample));
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    monitor.stop().unwrap();
-    let rows = inspect(&path).unwrap().rows;
+        sample
+    };
+    let show = |_: &Monitor, sender: &mut MonitorSender| {
+        offer(sender, (0..SAMPLES).map(moved));
+    };
+    let rows = recorded(scene, show).0.rows;
     let pictures = rows["/world/god_object"];
     assert!(pictures > 2, "{rows:?}");
     // The mesh is one row more.
@@ -195,15 +208,12 @@ fn dropping_the_monitor_completes_the_recording_too() {
 
 #[test]
 fn a_sample_that_is_not_finite_leaves_the_picture_and_is_counted() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("session.rrd");
-    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene()).unwrap();
-    let mut broken = sample(0);
-    broken.god_object_pose.translation.vector.x = f64::NAN;
-    sender.offer(broken);
-    let stats = monitor.stop().unwrap();
+    let (summary, stats) = recorded(scene(), |_, sender| {
+        let mut broken = sample(0);
+        broken.god_object_pose.translation.vector.x = f64::NAN;
+        sender.offer(broken);
+    });
     assert_eq!(stats.samples_not_finite, 1);
-    let summary = inspect(&path).unwrap();
     assert_eq!(summary.rows["/world/god_object"], 1, "only the first pose");
     assert_eq!(
         summary.rows["/log"], 3,

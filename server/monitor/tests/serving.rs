@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use taut_monitor::{
     BodyRole, InspectError, Monitor, MonitorBody, MonitorError, MonitorOptions, MonitorSample,
-    MonitorScene, Pose, observe,
+    MonitorScene, MonitorSender, Pose, observe,
 };
 
 fn on_free_ports() -> MonitorOptions {
@@ -15,6 +15,15 @@ fn on_free_ports() -> MonitorOptions {
         web_port: 0,
         ..MonitorOptions::default()
     }
+}
+
+/// A monitor of an empty scene, and `host:port` of its page and of its stream.
+fn served() -> (Monitor, MonitorSender, String, String) {
+    let scene = MonitorScene::new("empty");
+    let (monitor, sender) = Monitor::start(&on_free_ports(), scene).unwrap();
+    let page = host_of(monitor.address().unwrap()).to_owned();
+    let stream = host_of(monitor.stream_address().unwrap()).to_owned();
+    (monitor, sender, page, stream)
 }
 
 /// `host:port` of a URL.
@@ -43,27 +52,16 @@ fn answer(address: &str, head: &str) -> String {
 
 #[test]
 fn the_page_opens_the_stream_and_both_end_with_the_monitor() {
-    let scene = MonitorScene::new("empty");
-    let (monitor, mut sender) = Monitor::start(&on_free_ports(), scene).unwrap();
-    let page = monitor.address().unwrap().to_owned();
-    let stream = monitor.stream_address().unwrap().to_owned();
-    let (page_host, stream_host) = (host_of(&page), host_of(&stream));
-    let stream_port = stream_host.rsplit(':').next().unwrap();
+    let (monitor, mut sender, page, stream) = served();
+    let stream_port = stream.rsplit(':').next().unwrap();
+    let address = monitor.address().unwrap();
     assert!(
-        page.contains(&format!("%3A{stream_port}%2Fproxy")),
-        "{page}"
+        address.contains(&format!("%3A{stream_port}%2Fproxy")),
+        "{address}"
     );
 
     // The page is there ...
-    let mut connection = TcpStream::connect(page_host).unwrap();
-    write!(
-        connection,
-        "GET / HTTP/1.1\r\nHost: {page_host}\r\nConnection: close\r\n\r\n"
-    )
-    .unwrap();
-    let mut html = Vec::new();
-    connection.read_to_end(&mut html).unwrap();
-    let html = String::from_utf8_lossy(&html);
+    let html = answer(&page, &format!("GET / HTTP/1.1\r\nHost: {page}\r\n"));
     assert!(
         html.starts_with("HTTP/1.1 200"),
         "{}",
@@ -73,9 +71,9 @@ fn the_page_opens_the_stream_and_both_end_with_the_monitor() {
 
     // ... may read the stream from a browser, and another site's page may not.
     let path = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
-    let allowed = request(stream_host, path, &format!("http://{page_host}"));
+    let allowed = request(&stream, path, &format!("http://{page}"));
     assert!(allowed.contains("access-control-allow-origin"), "{allowed}");
-    let refused = request(stream_host, path, "http://example.org");
+    let refused = request(&stream, path, "http://example.org");
     assert!(
         !refused.contains("access-control-allow-origin"),
         "{refused}"
@@ -83,7 +81,7 @@ fn the_page_opens_the_stream_and_both_end_with_the_monitor() {
 
     assert!(sender.offer(MonitorSample::at(1)));
     monitor.stop().unwrap();
-    for host in [page_host, stream_host] {
+    for host in [&page, &stream] {
         let start = Instant::now();
         while TcpStream::connect(host).is_ok() {
             assert!(
@@ -107,10 +105,7 @@ fn status(address: &str, method: &str, path: &str, headers: &str) -> String {
 
 #[test]
 fn a_page_from_elsewhere_reaches_neither_port_and_nobody_writes_into_the_stream() {
-    let scene = MonitorScene::new("empty");
-    let (monitor, _sender) = Monitor::start(&on_free_ports(), scene).unwrap();
-    let page = host_of(monitor.address().unwrap()).to_owned();
-    let stream = host_of(monitor.stream_address().unwrap()).to_owned();
+    let (monitor, _sender, page, stream) = served();
     let page_port = page.rsplit(':').next().unwrap();
     let service = "/rerun.sdk_comms.v1alpha1.MessageProxyService";
     let (read, write) = (
@@ -166,10 +161,7 @@ fn a_page_from_elsewhere_reaches_neither_port_and_nobody_writes_into_the_stream(
 /// Of 64 places, one address may have 16; whoever has asked is not among them.
 #[test]
 fn silent_connections_to_both_ports_lose_their_places_to_newcomers() {
-    let scene = MonitorScene::new("empty");
-    let (monitor, _sender) = Monitor::start(&on_free_ports(), scene).unwrap();
-    let page = host_of(monitor.address().unwrap()).to_owned();
-    let stream = host_of(monitor.stream_address().unwrap()).to_owned();
+    let (monitor, _sender, page, stream) = served();
     let mut held = Vec::new();
     for address in [&page, &stream] {
         let mut silent: Vec<_> = (0..40)
@@ -182,15 +174,7 @@ fn silent_connections_to_both_ports_lose_their_places_to_newcomers() {
                 connection
             })
             .collect();
-        for connection in &mut silent[..20] {
-            connection
-                .set_read_timeout(Some(Duration::from_secs(20)))
-                .unwrap();
-            match connection.read(&mut [0; 16]) {
-                Ok(length) => assert_eq!(length, 0, "closed without an answer"),
-                Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
-            }
-        }
+        silent[..20].iter_mut().for_each(assert_closed);
         held.extend(silent);
     }
     let asks = "Access-Control-Request-Method: POST\r\n";
@@ -200,6 +184,27 @@ fn silent_connections_to_both_ports_lose_their_places_to_newcomers() {
     let own = format!("Host: {page}\r\n");
     assert_eq!(status(&page, "GET", "/", &own), "200");
     monitor.stop().unwrap();
+}
+
+/// Closed without an answer.
+fn assert_closed(connection: &mut TcpStream) {
+    connection
+        .set_read_timeout(Some(Duration::from_secs(20)))
+        .unwrap();
+    match connection.read(&mut [0; 16]) {
+        Ok(length) => assert_eq!(length, 0, "closed without an answer"),
+        Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
+    }
+}
+
+/// So many who have asked, and stay.
+fn askers(count: usize, page: &str) -> Vec<TcpStream> {
+    let asker = |_| {
+        let mut connection = TcpStream::connect(page).unwrap();
+        ask(&mut connection, page);
+        connection
+    };
+    (0..count).map(asker).collect()
 }
 
 /// Asks for what is not there, and leaves the connection open.
@@ -223,21 +228,9 @@ fn ask(connection: &mut TcpStream, address: &str) {
 /// Of those who have asked, 64 of one address.
 #[test]
 fn whoever_has_asked_makes_room_too_when_too_many_stay() {
-    let scene = MonitorScene::new("empty");
-    let (monitor, _sender) = Monitor::start(&on_free_ports(), scene).unwrap();
-    let page = host_of(monitor.address().unwrap()).to_owned();
-    let mut held: Vec<TcpStream> = Vec::new();
-    for _ in 0..64 + 4 {
-        let mut connection = TcpStream::connect(&page).unwrap();
-        ask(&mut connection, &page);
-        held.push(connection);
-    }
-    for connection in &mut held[..4] {
-        match connection.read(&mut [0; 16]) {
-            Ok(length) => assert_eq!(length, 0, "closed"),
-            Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
-        }
-    }
+    let (monitor, _sender, page, _) = served();
+    let mut held = askers(64 + 4, &page);
+    held[..4].iter_mut().for_each(assert_closed);
     held[4..].iter_mut().for_each(|stays| ask(stays, &page));
     monitor.stop().unwrap();
 }
@@ -245,21 +238,14 @@ fn whoever_has_asked_makes_room_too_when_too_many_stay() {
 /// Who takes nothing of 42 MB makes room as well, even if there is more of him to read.
 #[test]
 fn a_reader_who_takes_nothing_makes_room_when_too_many_stay() {
-    let scene = MonitorScene::new("empty");
-    let (monitor, _sender) = Monitor::start(&on_free_ports(), scene).unwrap();
-    let page = host_of(monitor.address().unwrap()).to_owned();
+    let (monitor, _sender, page, _) = served();
     let mut slow = TcpStream::connect(&page).unwrap();
     let whole = format!("GET /re_viewer_bg.wasm HTTP/1.1\r\nHost: {page}\r\n\r\n");
     slow.write_all(whole.repeat(2).as_bytes()).unwrap();
     slow.set_read_timeout(Some(Duration::from_secs(20)))
         .unwrap();
     slow.read_exact(&mut [0; 16]).unwrap(); // it is being answered
-    let mut held: Vec<TcpStream> = Vec::new();
-    for _ in 0..64 {
-        let mut connection = TcpStream::connect(&page).unwrap();
-        ask(&mut connection, &page);
-        held.push(connection);
-    }
+    let _held = askers(64, &page);
     // What the system had taken for him already is less than the file.
     let mut rest = Vec::new();
     let ended = slow.read_to_end(&mut rest);
