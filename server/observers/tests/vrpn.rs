@@ -53,6 +53,14 @@ impl Connection {
         }
     }
 
+    /// A client that was greeted.
+    fn greeted(server: &VrpnServer) -> Self {
+        let stream = TcpStream::connect(server.address()).expect("the server");
+        let mut connection = Self::new(stream, None, "taut");
+        connection.wait("greeting", |e| matches!(e, Event::Found).then_some(()));
+        connection
+    }
+
     /// Moves bytes until an event comes that `wanted` takes; whether it came by datagram.
     fn wait<T>(&mut self, what: &str, mut wanted: impl FnMut(&Event) -> Option<T>) -> (T, bool) {
         let end = Instant::now() + PATIENCE;
@@ -105,9 +113,7 @@ fn pose_of(sensor: i32) -> impl FnMut(&Event) -> Option<[f64; 3]> {
 #[test]
 fn over_tcp_a_client_hears_poses_velocity_force_contact_point_buttons_and_pong() {
     let (_workbench, server) = serve(120.0);
-    let stream = TcpStream::connect(server.address()).expect("the server");
-    let mut connection = Connection::new(stream, None, "taut");
-    connection.wait("greeting", |e| matches!(e, Event::Found).then_some(()));
+    let mut connection = Connection::greeted(&server);
     let (all, _) = connection.wait("all buttons", |e| match e {
         Event::Buttons(states) => Some(states.0.clone()),
         _ => None,
@@ -187,9 +193,7 @@ fn a_datagram_calls_the_server_back_and_poses_come_by_datagram() {
 #[test]
 fn garbage_is_cut_off_and_others_do_not_notice() {
     let (_workbench, server) = serve(120.0);
-    let stream = TcpStream::connect(server.address()).expect("the server");
-    let mut good = Connection::new(stream, None, "taut");
-    good.wait("greeting", |e| matches!(e, Event::Found).then_some(()));
+    let mut good = Connection::greeted(&server);
     let asking = UdpSocket::bind("127.0.0.1:0").expect("a free port");
     for garbage in [
         &b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"[..],
@@ -241,12 +245,7 @@ fn a_client_that_does_not_read_is_dropped_and_the_workbench_does_not_wait() {
 fn there_are_never_more_clients_than_places() {
     let (_workbench, server) = serve(120.0);
     let mut connections: Vec<Connection> = (0..MAX_CLIENTS)
-        .map(|_| {
-            let stream = TcpStream::connect(server.address()).expect("the server");
-            let mut connection = Connection::new(stream, None, "taut");
-            connection.wait("greeting", |e| matches!(e, Event::Found).then_some(()));
-            connection
-        })
+        .map(|_| Connection::greeted(&server))
         .collect();
     let mut one_more = TcpStream::connect(server.address()).expect("the system accepts");
     one_more.set_read_timeout(Some(PATIENCE)).expect("a socket");
@@ -261,19 +260,14 @@ fn there_are_never_more_clients_than_places() {
     wait_for("room", || {
         (server.clients() == MAX_CLIENTS - 1).then_some(())
     });
-    let stream = TcpStream::connect(server.address()).expect("the server");
-    Connection::new(stream, None, "taut")
-        .wait("greeting", |e| matches!(e, Event::Found).then_some(()));
+    Connection::greeted(&server);
 }
 
 #[test]
 fn a_server_that_ends_ends_its_connections() {
     let (_workbench, server) = serve(120.0);
-    let stream = TcpStream::connect(server.address()).expect("the server");
-    let mut connection = Connection::new(stream, None, "taut");
-    connection.wait("greeting", |e| matches!(e, Event::Found).then_some(()));
+    let mut stream = Connection::greeted(&server).stream;
     drop(server);
-    let mut stream = connection.stream;
     stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
     // What was under way, then the end or a reset, and no silence.
     let ended = stream.read_to_end(&mut Vec::new());

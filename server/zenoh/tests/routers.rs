@@ -99,16 +99,19 @@ fn workbench(stop: &Arc<AtomicBool>) -> StateFeed {
     feed
 }
 
-fn publisher(connect: &str, feed: StateFeed) -> ZenohPublisher {
-    let settings = ZenohSettings {
+fn settings(connect: &str) -> ZenohSettings {
+    ZenohSettings {
         name: "bench".to_owned(),
         connect: vec![connect.trim_matches('"').to_owned()],
         config: None,
         rate: 100.0,
         naming: |_| None,
         ros: None,
-    };
-    ZenohPublisher::start(settings, &hello(), feed).expect("a good configuration")
+    }
+}
+
+fn publisher(connect: &str, feed: StateFeed) -> ZenohPublisher {
+    ZenohPublisher::start(settings(connect), &hello(), feed).expect("a good configuration")
 }
 
 fn line(payload: &zenoh::bytes::ZBytes) -> Value {
@@ -200,25 +203,19 @@ fn a_router_that_comes_later_is_found() {
 
 #[test]
 fn a_wrong_configuration_is_said_at_once_and_an_end_without_a_router_does_not_wait() {
-    let settings = |connect: &str, config: Option<&str>| ZenohSettings {
-        name: "bench".to_owned(),
-        connect: vec![connect.to_owned()],
-        config: config.map(Into::into),
-        rate: 100.0,
-        naming: |_| None,
-        ros: None,
-    };
     let (_, feed) = state_channel();
-    let refused = ZenohPublisher::start(settings("no endpoint", None), &hello(), feed);
+    let refused = ZenohPublisher::start(settings("no endpoint"), &hello(), feed);
     let error = refused.expect_err("no endpoint").to_string();
     assert!(error.contains("connect"), "{error}");
     let (_, feed) = state_channel();
-    let missing = settings("tcp/127.0.0.1:1", Some("/nowhere/zenoh.json5"));
+    let missing = ZenohSettings {
+        config: Some("/nowhere/zenoh.json5".into()),
+        ..settings("tcp/127.0.0.1:1")
+    };
     assert!(ZenohPublisher::start(missing, &hello(), feed).is_err());
 
     let (_, feed) = state_channel();
-    let waiting = ZenohPublisher::start(settings("tcp/127.0.0.1:1", None), &hello(), feed);
-    drop(waiting.expect("a good configuration"));
+    drop(publisher("tcp/127.0.0.1:1", feed));
 }
 
 #[test]
@@ -227,15 +224,11 @@ fn no_two_nodes_of_ros_have_the_same_name() {
     let connect = vec![endpoint.trim_matches('"').to_owned()];
     let stop = Arc::<AtomicBool>::default();
     let settings = ZenohSettings {
-        name: "bench".to_owned(),
-        connect: connect.clone(),
-        config: None,
-        rate: 100.0,
-        naming: |_| None,
         ros: Some(RosSettings {
             domain: Domain(7),
             session_time: SessionTime::reading(Duration::ZERO),
         }),
+        ..settings(&endpoint)
     };
     let _publisher =
         ZenohPublisher::start(settings, &hello(), workbench(&stop)).expect("a good configuration");
