@@ -1,10 +1,8 @@
 //! What the hand feels in each tick: haptics loop to monitor.
 //!
 //! Writer: loop 3, once per tick, wait-free. Reader: the monitor's feed, 50 times a second, which takes all there are, so that a peak of one tick is seen.
-//! A full queue means that nobody reads, or not in time: the newest tick is left out and counted. All memory is allocated at the start.
+//! A full queue means that nobody reads, or not in time: the newest tick is left out. All memory is allocated at the start.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use god_object::spatial::Vector6;
@@ -24,54 +22,30 @@ pub struct FeltTick {
 
 /// The loop's end.
 #[derive(Debug)]
-pub struct FeltWriter {
-    ticks: Producer<FeltTick>,
-    left_out: Arc<AtomicU64>,
-}
+pub struct FeltWriter(Producer<FeltTick>);
 
 /// The monitor's end.
 #[derive(Debug)]
-pub struct FeltReader {
-    ticks: Consumer<FeltTick>,
-    left_out: Arc<AtomicU64>,
-}
+pub struct FeltReader(Consumer<FeltTick>);
 
 /// Both ends.
 pub fn channel() -> (FeltWriter, FeltReader) {
     let (writer, reader) = RingBuffer::new(CAPACITY);
-    let left_out = Arc::<AtomicU64>::default();
-    let counted = Arc::clone(&left_out);
-    (
-        FeltWriter {
-            ticks: writer,
-            left_out,
-        },
-        FeltReader {
-            ticks: reader,
-            left_out: counted,
-        },
-    )
+    (FeltWriter(writer), FeltReader(reader))
 }
 
 impl FeltWriter {
-    /// Hands a tick over, or counts it.
+    /// Hands a tick over, if there is room.
     pub fn push(&mut self, tick: FeltTick) {
-        if self.ticks.push(tick).is_err() {
-            self.left_out.fetch_add(1, Ordering::Relaxed);
-        }
+        let _ = self.0.push(tick);
     }
 }
 
 impl FeltReader {
     /// The ticks since the last call, in order; no more than the queue holds, however fast the writer is.
     pub fn take(&mut self) -> impl Iterator<Item = FeltTick> + '_ {
-        let there = self.ticks.slots();
-        (0..there).map_while(|_| self.ticks.pop().ok())
-    }
-
-    /// Ticks that found no room.
-    pub fn left_out(&self) -> u64 {
-        self.left_out.load(Ordering::Relaxed)
+        let there = self.0.slots();
+        (0..there).map_while(|_| self.0.pop().ok())
     }
 }
 
@@ -95,7 +69,6 @@ mod tests {
         for number in 0..CAPACITY + 5 {
             writer.push(tick(number as f64));
         }
-        assert_eq!(reader.left_out(), 5);
         assert_eq!(
             reader.take().last().map(|tick| tick.wrench.x),
             Some((CAPACITY - 1) as f64)
