@@ -24,7 +24,6 @@ const REFUSAL_LIMIT: Duration = Duration::from_secs(30);
 /// The directory, the files in it, and the right to run a workbench now.
 #[derive(Debug)]
 pub struct TestWorkbench {
-    /// Program under test.
     program: PathBuf,
     /// The workbench file's content.
     pub file: Table,

@@ -101,7 +101,6 @@ impl Client {
         });
     }
 
-    /// Everything that arrived.
     fn leave(self) -> Vec<ReceivedState> {
         assert_eq!(self.link.is_closed(), None);
         self.stop.store(true, Ordering::Relaxed);
@@ -236,7 +235,6 @@ fn assert_pushes(states: &[ReceivedState]) {
     );
 }
 
-/// The push reached the device.
 fn assert_felt(bridge: Process) {
     let report = bridge.leave_json();
     assert!(

@@ -32,7 +32,6 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Files with this ending.
 pub(crate) fn files(ending: &str) -> Vec<PathBuf> {
     let mut found = everything();
     found.retain(|path| path.extension().is_some_and(|of| of == ending) && path.is_file());

@@ -9,7 +9,6 @@ pub(crate) const WORLD: &str = "world";
 pub(crate) const GOD_OBJECT: &str = "world/god_object";
 /// Pose of the device; the ghost is below it.
 pub(crate) const DEVICE: &str = "world/device";
-/// The viewer's head.
 pub(crate) const HEAD: &str = "world/head";
 /// Contact points and normals.
 pub(crate) const CONTACTS: &str = "world/contacts";
@@ -29,7 +28,6 @@ pub(crate) const GAP: &str = "plots/gap";
 pub(crate) const CONSTRAINT_AGE: &str = "plots/constraint_age";
 /// Datagrams per second and clients.
 pub(crate) const NETWORK: &str = "plots/network";
-/// Lines of text.
 pub(crate) const LOG: &str = "log";
 
 /// The path of a named thing in a folder; any name is allowed.

@@ -64,14 +64,12 @@ pub struct MonitorSender {
     lines_dropped: Arc<AtomicU64>,
 }
 
-/// The monitoring thread's end.
 pub(crate) struct MonitorReceiver {
     pub(crate) samples: Consumer<MonitorSample>,
     pub(crate) lines: Consumer<ShortLine>,
     pub(crate) counters: Arc<Counters>,
 }
 
-/// Makes both ends.
 pub(crate) fn queue(
     counters: Arc<Counters>,
     lines_dropped: Arc<AtomicU64>,

@@ -92,7 +92,6 @@ impl Envelope {
         self.oldest_constraints_us = self.oldest_constraints_us.max(constraint_age_us);
     }
 
-    /// Adds what another has.
     pub(crate) fn join(&mut self, other: &Self) {
         for ((least, largest), more) in self.felt.iter_mut().zip(&other.felt) {
             (*least, *largest) = (least.min(more.0), largest.max(more.1));

@@ -12,13 +12,10 @@ use crate::request::MAX_REQUEST_BYTES;
 
 /// Longest that somebody may take nothing of what is sent.
 pub(crate) const SEND_TIME: Duration = Duration::from_secs(5);
-/// Sentences for people.
 pub(crate) const TEXT: &str = "text/plain; charset=utf-8";
-/// Pages.
 pub(crate) const HTML: &str = "text/html; charset=utf-8";
 /// One JSON object a line.
 pub(crate) const JSON_LINES: &str = "application/x-ndjson";
-/// Pictures.
 pub(crate) const PNG: &str = "image/png";
 /// Bytes that are sent at a time: who takes none of them for [`SEND_TIME`] is given up, and who takes a few is not.
 const CHUNK_BYTES: usize = 64 << 10;
@@ -72,7 +69,6 @@ pub(crate) async fn body(
     Ok(body)
 }
 
-/// The head of an answer.
 pub(crate) fn head(status: &str, kind: &str) -> String {
     format!("HTTP/1.1 {status}\r\nContent-Type: {kind}\r\n{COMMON_HEADERS}\r\n")
 }
@@ -104,7 +100,6 @@ pub(crate) async fn send(sending: impl Future<Output = io::Result<()>>) -> Resul
 pub(crate) struct Lines(pub(crate) TcpStream);
 
 impl Lines {
-    /// Sends one line.
     pub(crate) async fn line(&mut self, line: &str) -> Result<(), End> {
         let whole = format!("{line}\n");
         send(self.0.write_all(whole.as_bytes())).await

@@ -22,13 +22,11 @@ pub enum Deed {
 /// What is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Call {
-    /// The page.
     Page,
     /// The newest status line alone.
     Status,
     /// Every status line.
     Lines,
-    /// The scene that runs.
     Scene,
     /// Whether the token is right.
     Token,
@@ -38,7 +36,6 @@ pub(crate) enum Call {
     Pictures,
     /// One of these, by its number.
     Picture(u64),
-    /// Something done.
     Act(Deed),
 }
 
@@ -58,15 +55,10 @@ pub(crate) enum Refusal {
     NotHttp,
     /// Asked for by a page from elsewhere, or by a name that may be anybody's.
     Foreign,
-    /// Nothing is there.
     NotFound,
-    /// One looks by GET.
     LookByGet,
-    /// One acts by POST.
     ActByPost,
-    /// The token is missing.
     NoToken,
-    /// The token is wrong.
     WrongToken,
     /// The length of its body is not said, or is no number.
     NoLength,

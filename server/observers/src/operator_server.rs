@@ -39,7 +39,6 @@ const MAX_VIEWERS: usize = 16;
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Time between two looks at what it did.
 const LOOK_PERIOD: Duration = Duration::from_millis(5);
-/// A deed was not done.
 const NOT_DONE: &str = "409 Conflict";
 /// A deed was asked for, and nothing came of it in [`PATIENCE`].
 const NO_ANSWER: (&str, &str) = (
@@ -226,7 +225,6 @@ enum Heard {
     Done(Outcome),
     /// The same of what may take long: how long it may, what is said where it took longer, and what kind of answer it is.
     Slow(Outcome, Patience),
-    /// A deed was not done.
     NotDone(String),
     /// Nothing is given.
     Refused(Refusal),

@@ -13,11 +13,9 @@ const MAX_HEADERS: usize = 64;
 /// What an observer wants.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Wish {
-    /// The page.
     Page,
     /// The `hello` line alone.
     Hello,
-    /// The program's metrics.
     Metrics,
     /// Lines as the body of an answer.
     Lines,
@@ -32,7 +30,6 @@ pub(crate) enum Refusal {
     NotHttp,
     /// Not a GET.
     Method,
-    /// Nothing is there.
     NotFound,
     /// The token is missing or wrong.
     Token,

@@ -30,7 +30,6 @@ pub(crate) struct Service {
 pub(crate) struct Stop(watch::Receiver<bool>);
 
 impl Stop {
-    /// Waits for the end.
     pub(crate) async fn asked(&mut self) {
         // An error means that the service is gone: the end, too.
         let _ = self.0.wait_for(|asked| *asked).await;
@@ -56,7 +55,6 @@ pub(crate) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     socket.listen(BACKLOG)
 }
 
-/// The next client.
 pub(crate) async fn accepted(listener: &TcpListener) -> (TcpStream, SocketAddr) {
     loop {
         match listener.accept().await {

@@ -271,9 +271,7 @@ async fn answer_at_once(
     }
 }
 
-/// A carrier of lines.
 trait Carrier {
-    /// Sends one line.
     fn line(&mut self, line: Utf8Bytes) -> impl Future<Output = Result<(), End>> + Send;
     /// Waits until the observer goes.
     fn gone(&mut self) -> impl Future<Output = ()> + Send;

@@ -23,7 +23,6 @@ use crate::vrpn_reports::{VrpnFrame, button_reports};
 
 /// Longest that a client may take to greet, and a call-back to be answered.
 const GREETING_TIME: Duration = Duration::from_secs(5);
-/// Bytes read at a time.
 const READ_BYTES: usize = 4096;
 
 /// How the server is set up.

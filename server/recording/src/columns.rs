@@ -13,9 +13,7 @@ use crate::records::{ConstraintRecord, ForceRecord, HapticsRecord, UpdateRecord}
 
 /// A record that is a line of a file.
 pub trait Line: Sized {
-    /// Name of the file.
     const FILE: &'static str;
-    /// First line of the file.
     const HEADER: &'static str;
     /// Name of a last column that older recordings have not.
     const ADDED: &'static str = "";

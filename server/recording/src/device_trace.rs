@@ -106,7 +106,6 @@ fn line(text: &str, record: &csv::StringRecord) -> usize {
     })
 }
 
-/// Where the columns stand.
 struct Columns {
     numbers: [usize; TRACE_COLUMNS.len()],
     buttons: Option<usize>,

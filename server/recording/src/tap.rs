@@ -103,7 +103,6 @@ pub(crate) struct Drains {
     pub(crate) forces: Drain<ForceRecord>,
 }
 
-/// All queues.
 pub(crate) fn taps() -> (Taps, Drains) {
     let (haptics, haptics_drain) = tap(TICKS);
     let (updates, updates_drain) = tap(TICKS);

@@ -75,7 +75,6 @@ struct Answer {
     arm: bool,
     /// Whether a state came: what the port does already is known then.
     knows: bool,
-    /// Whether the server was asked.
     asked: bool,
 }
 

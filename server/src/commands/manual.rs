@@ -8,7 +8,6 @@ use clap_complete::Shell;
 use crate::cli::Cli;
 use crate::shared::failure::Failure;
 
-/// The completions of a shell.
 pub(super) fn completions(shell: Shell) -> Result<String, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "taut", &mut script);

@@ -17,7 +17,6 @@ use crate::shared::failure::Failure;
 const LONGEST_LINE: u64 = 1000;
 /// Lines that wait to be sent.
 const WAITING_LINES: usize = 64;
-/// Six numbers.
 type Wrench = [f64; 6];
 
 /// Sends until the duration or the input is over, the user ends it, or the server stops; a server that is lost is joined again. How many values were sent.

@@ -132,7 +132,6 @@ fn not_written(out: &Path, error: &std::io::Error, kept: Option<&Path>) -> Failu
     })
 }
 
-/// A recording under way.
 struct Recorder {
     link: Arc<ClientLink>,
     /// Of the first session: a trace is of one scene.

@@ -11,7 +11,6 @@ use taut_link::{
 use crate::commands::signals::EndSignal;
 use crate::shared::failure::Failure;
 
-/// What is sent.
 pub(super) trait Source {
     /// A session begins, the first or another one.
     fn begin(&mut self, _link: &ClientLink) {}

@@ -53,7 +53,6 @@ pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
     sending::run(sending, options, signal, source).await
 }
 
-/// A source at work.
 enum Head {
     Still(Option<Pose>),
     Trace(TracePlayer),

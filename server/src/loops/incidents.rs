@@ -16,7 +16,6 @@ struct Incident {
     count: AtomicU64,
     /// Number of the newest event among all of the port.
     number: AtomicU64,
-    /// Its time, ns.
     time_ns: AtomicU64,
     value: AtomicF64,
 }

@@ -291,7 +291,6 @@ fn counts(to: &mut DescriptorEncoder<'_>, metrics: &Metrics) -> fmt::Result {
     Ok(())
 }
 
-/// The counters of the link.
 fn network(to: &mut DescriptorEncoder<'_>, metrics: &Metrics) -> fmt::Result {
     for (name, count) in &metrics.network {
         counter(
@@ -374,7 +373,6 @@ fn this_process(to: &mut DescriptorEncoder<'_>, metrics: &Metrics) -> fmt::Resul
     )
 }
 
-/// A force from outside.
 fn external_wrench(to: &mut DescriptorEncoder<'_>, of: &ExternalWrenchReport) -> fmt::Result {
     gauge(
         to,

@@ -160,7 +160,6 @@ impl AuditTrail {
     }
 }
 
-/// What an operator asked for.
 fn arming(arm: bool) -> &'static str {
     if arm { "arm" } else { "disarm" }
 }

@@ -196,7 +196,6 @@ impl StateWriter {
     }
 }
 
-/// Whether there are forces.
 fn run_state(device: &DeviceState) -> RunState {
     match device.safety.arming {
         _ if device.faulty => RunState::Fault,

@@ -27,7 +27,6 @@ use super::external;
 /// Threads of the network runtime: one for packets, one for joins.
 const NETWORK_THREADS: usize = 2;
 
-/// What is to be opened.
 pub(super) struct ConnectionSettings<'a> {
     /// What a bridge is offered.
     pub(super) coupling: CouplingOffer,

@@ -71,7 +71,6 @@ impl Handover {
         }
     }
 
-    /// The clock of its loops.
     pub(super) fn begins_at(&mut self, clock: SessionClock) {
         self.clock = clock;
     }

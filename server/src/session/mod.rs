@@ -197,7 +197,6 @@ impl Session {
         &self.arm_switch
     }
 
-    /// Where the body began.
     pub(crate) fn beginning(&self) -> &Beginning {
         &self.beginning
     }

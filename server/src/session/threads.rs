@@ -33,7 +33,6 @@ pub(super) struct SessionThreads {
     pub(super) coupling: CouplingLoop,
     pub(super) god_object: GodObjectLoop,
     pub(super) haptics: HapticsLoop,
-    /// Wakes the coupling.
     pub(super) waker: Waker,
     pub(super) checker: Option<(PenetrationChecker, Subscriber<ContactSnapshot>)>,
     pub(super) states: StateWriter,

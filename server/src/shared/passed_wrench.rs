@@ -4,9 +4,7 @@
 
 use taut_bridge::JudgedWrench;
 
-/// The writing end.
 pub(crate) type PassedWriter = triple_buffer::Input<Option<JudgedWrench>>;
-/// The reading end.
 pub(crate) type PassedReader = triple_buffer::Output<Option<JudgedWrench>>;
 
 /// Both ends; nothing is passed on yet.

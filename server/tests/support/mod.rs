@@ -33,7 +33,6 @@ impl Workplace {
         workplace
     }
 
-    /// A file in it.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.directory.path().join(name)
     }
@@ -43,7 +42,6 @@ impl Workplace {
         self.path(name).display().to_string()
     }
 
-    /// Writes a file.
     pub(crate) fn write(&self, name: &str, text: &str) {
         assert!(std::fs::write(self.path(name), text).is_ok());
     }

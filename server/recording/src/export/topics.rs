@@ -22,7 +22,6 @@ const GOD_OBJECT: &str = "god_object";
 /// At the reference point of the body where the device is, with the axes of the world: where wrenches and twists stand.
 const REFERENCE_POINT: &str = "reference_point";
 
-/// One topic.
 struct Topic {
     channel: u16,
     messages: u32,
@@ -153,7 +152,6 @@ impl<'a, W: Write> Topics<'a, W> {
             .put(&mut self.coupling_wrench, record.time, &wrench)
     }
 
-    /// How many messages there are.
     pub(super) fn messages(&self) -> u64 {
         self.out.messages
     }

@@ -91,7 +91,6 @@ impl NamedChild {
         self.ended
     }
 
-    /// Whether it still runs.
     pub(super) fn is_running(&mut self) -> bool {
         self.newly_ended();
         self.ended.is_none()

@@ -53,7 +53,6 @@ impl DemoDirectory {
         Ok((created, key))
     }
 
-    /// The directory.
     pub(super) fn path(&self) -> &Path {
         self.directory.path()
     }

@@ -19,7 +19,6 @@ pub(super) enum Mode {
 }
 
 impl Mode {
-    /// The permission bits.
     pub(super) fn bits(self) -> u32 {
         match self {
             Self::Secret => 0o600,
@@ -29,7 +28,6 @@ impl Mode {
     }
 }
 
-/// A file of an archive.
 pub(super) struct File {
     /// Relative to the archive's folder; folders are separated by `/`.
     pub(super) path: PathBuf,

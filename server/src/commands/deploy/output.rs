@@ -9,7 +9,6 @@ use tempfile::NamedTempFile;
 use crate::commands::keys::create_private;
 use crate::shared::failure::Failure;
 
-/// A finished archive.
 pub(super) struct Archive {
     pub(super) name: String,
     pub(super) content: Vec<u8>,

@@ -24,13 +24,11 @@ const ON_HID: &[&str] = &[
 /// Instead of the unit's own: opened again by itself, the device would take the place where it is held then for its home.
 const STARTED_BY_A_PERSON: &str = "Restart=no";
 
-/// A unit of a machine.
 pub(super) struct Unit {
     /// With its ending.
     pub(super) name: String,
     /// Of the session of the account that draws, else of the system.
     pub(super) is_session: bool,
-    /// Its file.
     pub(super) text: String,
 }
 

@@ -9,7 +9,6 @@ use taut_spidar::{Extreme, picture, summary, workspace_map};
 
 use crate::shared::failure::Failure;
 
-/// Millimetres in a metre.
 const MM: f64 = 1e3;
 
 /// What was found about a device.

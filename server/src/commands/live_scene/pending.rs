@@ -11,9 +11,7 @@ use crate::shared::failure::Failure;
 
 /// What is being read.
 pub(super) enum Pending {
-    /// What a wish asks for.
     Wish(AskedScene, JoinHandle<Result<Option<Change>, Failure>>),
-    /// Files that were edited.
     Files(JoinHandle<Result<Next, Failure>>),
 }
 
@@ -26,12 +24,10 @@ impl Pending {
     }
 }
 
-/// Reads what is wanted.
 pub(super) fn make(wanted: Wanted) -> io::Result<JoinHandle<Result<Option<Change>, Failure>>> {
     on_own_thread(move || wanted.make())
 }
 
-/// Reads the files.
 pub(super) fn load(loader: Loader) -> io::Result<JoinHandle<Result<Next, Failure>>> {
     on_own_thread(move || {
         let mut next = loader.load()?;
@@ -46,7 +42,6 @@ fn on_own_thread<T: Send + 'static>(
     Builder::new().name("scene".to_owned()).spawn(read)
 }
 
-/// What came of it.
 pub(super) fn joined<T>(thread: JoinHandle<Result<T, Failure>>) -> Result<T, Failure> {
     thread.join().unwrap_or_else(|_| {
         Err(Failure::failed(

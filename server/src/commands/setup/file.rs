@@ -166,7 +166,6 @@ impl Answers {
     }
 }
 
-/// As a text of TOML.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for c in text.chars() {

@@ -7,7 +7,6 @@ use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use taut_bridge::haply::{self, ServiceAddress};
 use taut_bridge::{HidPort, PluggedPort, ReportPort, plugged_ports};
 
-/// A connected monitor.
 struct Monitor {
     /// Its output, such as DP-1.
     name: String,
@@ -15,7 +14,6 @@ struct Monitor {
     size: (u32, u32),
 }
 
-/// What was found.
 pub(super) struct Found {
     pub(super) host: String,
     /// Of the interface by which others are reached; loopback where there is none.

@@ -21,7 +21,6 @@ impl<R: BufRead, W: Write> Questions<R, W> {
         Self { input, output, yes }
     }
 
-    /// Writes a line.
     pub(super) fn tell(&mut self, text: &str) -> Result<(), Failure> {
         let written = writeln!(self.output, "{text}").and_then(|()| self.output.flush());
         written

@@ -174,7 +174,6 @@ impl OperatorPage {
         &self.line
     }
 
-    /// Takes who may join.
     pub(crate) fn follow_policy(&self, policy: &JoinPolicy) {
         self.door.desk.follow_policy(policy);
     }
@@ -189,7 +188,6 @@ impl OperatorPage {
         self.recent.line(now, severity, line);
     }
 
-    /// Takes the newest metrics.
     pub(crate) fn show_metrics(&mut self, metrics: &Metrics) {
         self.metrics = json(metrics);
     }

@@ -2,7 +2,6 @@
 
 use png::{BitDepth, ColorType, Decoder, Limits};
 
-/// What a PNG begins with.
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// Bytes of a chunk around its content: length, kind and checksum.
 const CHUNK_FRAME: usize = 12;

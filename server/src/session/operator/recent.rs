@@ -62,7 +62,6 @@ impl Recent {
         });
     }
 
-    /// All of it, newest first.
     pub(super) fn newest_first(&self) -> Vec<&Entry> {
         let mut all: Vec<&Entry> = self.events.iter().flatten().chain(&self.lines).collect();
         all.sort_by(|a, b| b.t.total_cmp(&a.t));

@@ -46,7 +46,6 @@ pub(crate) struct AskedScene {
 }
 
 impl AskedScene {
-    /// Says what came of it.
     pub(crate) fn answer(self, answer: Answer) {
         *lock(&self.answer) = Some(answer);
     }

@@ -29,9 +29,7 @@ const MAX_KEPT: usize = 1_000;
 #[derive(Debug, thiserror::Error)]
 #[error("the relay cannot {what}: {cause}")]
 pub struct RelayError {
-    /// What it wanted.
     what: &'static str,
-    /// What the system says.
     cause: io::Error,
 }
 
@@ -196,7 +194,6 @@ impl Thread {
         }
     }
 
-    /// Until something comes or arrives.
     fn wait(&self) {
         let now = Instant::now();
         let arrivals = self
