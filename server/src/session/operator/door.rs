@@ -1,6 +1,5 @@
 //! The page's port and its desk, which outlive a session that makes way for another: whoever is there stays, and his token counts.
 
-use std::net::SocketAddr;
 use std::sync::Arc;
 
 use taut_bridge::ArmSwitch;
@@ -65,11 +64,5 @@ impl Continuity {
     /// For a session without a page.
     pub(crate) fn close(&mut self) {
         self.door = None;
-    }
-}
-
-impl OperatorDoor {
-    pub(super) fn address(&self) -> SocketAddr {
-        self.server.address()
     }
 }

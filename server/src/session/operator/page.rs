@@ -137,7 +137,7 @@ impl OperatorPage {
             scene_revision: desk.scenes().revision(),
             ..facts
         });
-        let (address, token) = (door.address(), &wanted.server.token);
+        let (address, token) = (door.server.address(), &wanted.server.token);
         let line = match &wanted.token_file {
             None => format!(
                 "operator's page: http://{address}/#token={token} (who has this address can arm)"
