@@ -172,21 +172,24 @@ mod tests {
         );
     }
 
-    /// Numbers of red, green and blue pixels of a picture of a scene with this after `[god_object]`; `None`, said aloud, without an adapter.
-    fn counts(folder: &Path, rest: &str) -> Option<[usize; 3]> {
-        let path = folder.join("scene.toml");
-        let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{rest}");
-        assert!(fs::write(&path, text).is_ok());
+    /// The picture of the scene of this text; `None`, said aloud, without an adapter.
+    fn drawn(path: &Path, text: &str) -> Option<image::RgbaImage> {
+        fs::write(path, text).expect("written");
         let scene = path.display().to_string();
-        let preview = match preview(&scene, &GpuChoice::default(), (320, 240), 1) {
-            Ok(preview) => preview,
+        match preview(&scene, &GpuChoice::default(), (320, 240), 1) {
+            Ok(preview) => Some(preview.picture(0).expect("not drawn")),
             Err(Failure::BadInput(error)) => panic!("{error}"),
             Err(error) => {
                 taut_test_kit::left_out(error);
-                return None;
+                None
             }
-        };
-        let picture = preview.picture(0).expect("not drawn");
+        }
+    }
+
+    /// Numbers of red, green and blue pixels of a picture of a scene with this after `[god_object]`; `None`, said aloud, without an adapter.
+    fn counts(folder: &Path, rest: &str) -> Option<[usize; 3]> {
+        let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{rest}");
+        let picture = drawn(&folder.join("scene.toml"), &text)?;
         let strong = |pixel: &[u8; 4], part: usize| {
             let others = (0..3)
                 .filter(|other| *other != part)
@@ -277,16 +280,7 @@ mod tests {
             "name = \"x\"\n[god_object]\nmass = 1.0\n{body}\n[view]\nrotation = [{}, {x}, {y}, {z}]\n",
             turn.w
         );
-        fs::write(path, text).expect("written");
-        let scene = path.display().to_string();
-        match preview(&scene, &GpuChoice::default(), (320, 240), 1) {
-            Ok(preview) => Some(preview.picture(0).expect("not drawn")),
-            Err(Failure::BadInput(error)) => panic!("{error}"),
-            Err(error) => {
-                taut_test_kit::left_out(error);
-                None
-            }
-        }
+        drawn(path, &text)
     }
 
     /// All squares are where they are on the board, whose side takes 0.9 of the picture's height.
