@@ -30,21 +30,10 @@ fn a_recorded_session_is_read_back_with_its_entities_and_its_whole_time() {
         summary.rows.values().sum::<u64>(),
         summary.rows.len()
     );
-    let wanted = [
-        "/world/god_object",
-        "/world/device",
-        "/world/contacts",
-        "/world/force",
-        "/plots/force",
-        "/plots/torque",
-        "/plots/loops",
-        "/plots/contacts",
-        "/plots/gap",
-        "/plots/constraint_age",
-        "/plots/network",
-        "/log",
-    ];
-    for entity in wanted {
+    let wanted =
+        "/world/god_object /world/device /world/contacts /world/force /plots/force /plots/torque
+        /plots/loops /plots/contacts /plots/gap /plots/constraint_age /plots/network /log";
+    for entity in wanted.split_whitespace() {
         assert!(
             summary.rows.keys().any(|path| path.starts_with(entity)),
             "{entity} is missing in {:?}",

@@ -101,25 +101,10 @@ fn a_recorded_stream_is_read_back_with_its_entities_and_times() {
     assert_eq!(stats.samples_shown, SAMPLES);
     assert_eq!(stats.samples_dropped, 0);
 
-    for entity in [
-        "/log",
-        "/plots/constraint_age",
-        "/plots/contacts",
-        "/plots/force",
-        "/plots/gap",
-        "/plots/loops",
-        "/plots/network",
-        "/plots/torque",
-        "/world",
-        "/world/contacts",
-        "/world/device",
-        "/world/device/tool",
-        "/world/force",
-        "/world/god_object",
-        "/world/god_object/tool",
-        "/world/head",
-        "/world/screens/front",
-    ] {
+    let entities = "/log /plots/constraint_age /plots/contacts /plots/force /plots/gap /plots/loops /plots/network
+        /plots/torque /world /world/contacts /world/device /world/device/tool /world/force
+        /world/god_object /world/god_object/tool /world/head /world/screens/front";
+    for entity in entities.split_whitespace() {
         assert!(
             summary.rows.contains_key(entity),
             "no {entity} in {:?}",
