@@ -245,7 +245,7 @@ mod tests {
         order.take(&came(1, 2, EPOCH_MS + 1), ms(70));
         assert!(!went_back(&order));
         let hour_ago = EPOCH_MS - 3_600_000;
-        for sequence in [3, 4] {
+        for sequence in [3_i64, 4] {
             let now = ms(77 + sequence.unsigned_abs());
             order.take(&came(1, sequence, hour_ago + sequence), now);
             assert!(went_back(&order));
