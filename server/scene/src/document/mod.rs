@@ -3,6 +3,6 @@
 mod section;
 mod tree;
 
-pub(crate) use section::{Range, Section, nearest};
+pub(crate) use section::{Range, Section, nearest, table};
 pub use tree::Document;
 pub(crate) use tree::{At, Node, Value};

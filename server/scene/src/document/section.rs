@@ -1,6 +1,7 @@
 //! One table of a document, read key by key. Every fault is noted, so that a file is judged whole.
 
 use std::cell::RefCell;
+use std::fmt;
 
 use super::{At, Node, Value};
 use crate::problem::Problem;
@@ -104,6 +105,16 @@ impl<'a> Section<'a> {
             .map(|(_, node)| node)
     }
 
+    /// Notes a fault of `key`, or of the table that lacks it.
+    pub(crate) fn complain_of(&self, key: &'static str, text: impl Into<String>) {
+        self.complain(self.at_key(key), text);
+    }
+
+    /// The same in a sentence that begins with the key and the table.
+    pub(crate) fn fault(&self, key: &'static str, what: impl fmt::Display) {
+        self.complain_of(key, format!("`{key}` in {} {what}", self.name));
+    }
+
     /// Where `key` is, or where the table begins.
     pub(crate) fn at_key(&self, key: &'static str) -> &'a At {
         self.get(key).map_or(self.at, |node| &node.at)
@@ -122,15 +133,35 @@ impl<'a> Section<'a> {
         );
     }
 
+    /// Notes that `key` is missing, where it is.
+    pub(crate) fn require(&self, key: &'static str, example: &str) {
+        if !self.has(key) {
+            self.complain_missing(key, example);
+        }
+    }
+
+    fn wrong_value(&self, key: &str, at: &At, value: impl fmt::Display, wanted: &str) {
+        let text = format!("`{key}` in {} is {value}, but must be {wanted}", self.name);
+        self.complain(at, text);
+    }
+
     fn wrong_kind(&self, key: &str, node: &Node, wanted: &str) {
-        self.complain(
-            &node.at,
-            format!(
-                "`{key}` in {} is {}, but must be {wanted}",
-                self.name,
-                node.value.kind()
-            ),
-        );
+        self.wrong_value(key, &node.at, node.value.kind(), wanted);
+    }
+
+    /// What `of` makes of the value of `key`; a complaint where that is nothing.
+    fn value<T>(
+        &self,
+        key: &'static str,
+        wanted: &str,
+        of: impl FnOnce(&'a Value) -> Option<T>,
+    ) -> Option<T> {
+        let node = self.get(key)?;
+        let value = of(&node.value);
+        if value.is_none() {
+            self.wrong_kind(key, node, wanted);
+        }
+        value
     }
 
     /// A number in its range; `None` if it is absent or, with a complaint, wrong.
@@ -145,14 +176,7 @@ impl<'a> Section<'a> {
             return None;
         };
         if !range.contains(value) {
-            self.complain(
-                &node.at,
-                format!(
-                    "`{key}` in {} is {value}, but must be {}",
-                    self.name,
-                    range.wanted()
-                ),
-            );
+            self.wrong_value(key, &node.at, value, &range.wanted());
             return None;
         }
         Some(value)
@@ -170,56 +194,41 @@ impl<'a> Section<'a> {
         range: Range,
         example: &str,
     ) -> Option<f64> {
-        if !self.has(key) {
-            self.complain_missing(key, example);
-        }
+        self.require(key, example);
         self.number(key, range)
     }
 
     /// An integer between `low` and `high`, ends included.
-    pub(crate) fn integer(&self, key: &'static str, low: i64, high: i64) -> Option<i64> {
+    pub(crate) fn integer<T: TryFrom<i64>>(
+        &self,
+        key: &'static str,
+        low: i64,
+        high: i64,
+    ) -> Option<T> {
         let node = self.get(key)?;
+        let wanted = format!("between {low} and {high}");
         match node.value {
-            Value::Integer(value) if (low..=high).contains(&value) => Some(value),
-            Value::Integer(value) => {
-                let text = format!(
-                    "`{key}` in {} is {value}, but must be between {low} and {high}",
-                    self.name
-                );
-                self.complain(&node.at, text);
-                None
-            }
-            _ => {
-                self.wrong_kind(key, node, &format!("an integer between {low} and {high}"));
-                None
-            }
+            Value::Integer(value) if (low..=high).contains(&value) => return value.try_into().ok(),
+            Value::Integer(value) => self.wrong_value(key, &node.at, value, &wanted),
+            _ => self.wrong_kind(key, node, &format!("an integer {wanted}")),
         }
+        None
     }
 
     /// A text.
     pub(crate) fn text(&self, key: &'static str) -> Option<&'a str> {
-        let node = self.get(key)?;
-        match &node.value {
-            Value::Text(text) => Some(text),
-            _ => {
-                self.wrong_kind(key, node, "a text in quotes");
-                None
-            }
-        }
+        self.value(key, "a text in quotes", |value| match value {
+            Value::Text(text) => Some(text.as_str()),
+            _ => None,
+        })
     }
 
     /// A text that must be there and not be empty.
     pub(crate) fn required_text(&self, key: &'static str, example: &str) -> Option<&'a str> {
-        if !self.has(key) {
-            self.complain_missing(key, example);
-        }
+        self.require(key, example);
         let text = self.text(key)?;
         if text.is_empty() {
-            let at = self.get(key).map_or(self.at, |node| &node.at);
-            self.complain(
-                at,
-                format!("`{key}` in {} is empty; write {example}", self.name),
-            );
+            self.fault(key, format_args!("is empty; write {example}"));
             return None;
         }
         Some(text)
@@ -227,14 +236,10 @@ impl<'a> Section<'a> {
 
     /// A truth value.
     pub(crate) fn boolean(&self, key: &'static str) -> Option<bool> {
-        let node = self.get(key)?;
-        match node.value {
-            Value::Boolean(value) => Some(value),
-            _ => {
-                self.wrong_kind(key, node, "true or false");
-                None
-            }
-        }
+        self.value(key, "true or false", |value| match value {
+            Value::Boolean(value) => Some(*value),
+            _ => None,
+        })
     }
 
     /// One of several words.
@@ -248,12 +253,8 @@ impl<'a> Section<'a> {
         let found = choices.iter().find(|(name, _)| name == text);
         if found.is_none() {
             let hint = nearest(text, names.iter().copied());
-            let text = format!(
-                "`{key}` in {} is \"{text}\", but must be {}{hint}",
-                self.name,
-                listed(&names)
-            );
-            self.complain(&node.at, text);
+            let wanted = format!("{}{hint}", listed(&names));
+            self.wrong_value(key, &node.at, format_args!("\"{text}\""), &wanted);
         }
         found.map(|(_, value)| *value)
     }
@@ -270,12 +271,8 @@ impl<'a> Section<'a> {
             return None;
         };
         if items.len() != N {
-            let text = format!(
-                "`{key}` in {} has {} numbers, but must have {N}",
-                self.name,
-                items.len()
-            );
-            self.complain(&node.at, text);
+            let count = items.len();
+            self.fault(key, format_args!("has {count} numbers, but must have {N}"));
             return None;
         }
         let mut numbers = [0.0; N];
@@ -303,6 +300,12 @@ impl<'a> Section<'a> {
         Some(texts)
     }
 
+    /// The same without where each is; absent is empty.
+    pub(crate) fn words(&self, key: &'static str) -> Vec<String> {
+        let texts = self.texts(key).unwrap_or_default();
+        texts.iter().map(|(text, _)| (*text).to_owned()).collect()
+    }
+
     /// A name or a number from 0, or an array of them: outputs by name or by number.
     pub(crate) fn names_or_numbers(&self, key: &'static str) -> Option<Vec<String>> {
         const WANTED: &str = "a name in quotes, a number from 0, or an array of these";
@@ -317,8 +320,7 @@ impl<'a> Section<'a> {
                 Value::Text(text) if !text.is_empty() => names.push(text.clone()),
                 Value::Integer(number) if *number >= 0 => names.push(number.to_string()),
                 Value::Text(_) => {
-                    let text = format!("`{key}` in {} is empty, but must be {WANTED}", self.name);
-                    self.complain(&item.at, text);
+                    self.wrong_value(key, &item.at, "empty", WANTED);
                     return None;
                 }
                 _ => {
@@ -388,13 +390,23 @@ impl<'a> Section<'a> {
                 } else {
                     hint
                 };
-                self.complain(
-                    &node.at,
-                    format!("unknown key `{key}` in {}{hint}", self.name),
-                );
+                let text = format!("unknown key `{key}` in {}{hint}", self.name);
+                self.complain(&node.at, text);
             }
         }
     }
+}
+
+/// Reads a table and complains of the keys that were not asked for.
+pub(crate) fn table<T>(
+    parent: &Section<'_>,
+    key: &'static str,
+    read: impl FnOnce(&Section<'_>) -> T,
+) -> Option<T> {
+    let section = parent.section(key)?;
+    let value = read(&section);
+    section.finish();
+    Some(value)
 }
 
 fn as_number(node: &Node) -> Option<f64> {

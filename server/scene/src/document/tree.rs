@@ -37,17 +37,6 @@ pub(crate) struct Node {
     pub(crate) at: At,
 }
 
-impl Node {
-    /// The value of a table's key.
-    fn entry(&self, key: &str) -> Option<&Self> {
-        let Value::Table(entries) = &self.value else {
-            return None;
-        };
-        let found = entries.iter().find(|(name, _)| name == key);
-        found.map(|(_, node)| node)
-    }
-}
-
 /// A TOML value.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
@@ -86,8 +75,8 @@ pub struct Document {
 impl Document {
     /// Line, from 1, of `key` in a table, else of the table, or of the key of that name outside of all.
     pub fn line_of(&self, table: &str, key: &str) -> Option<usize> {
-        let table = self.root.entry(table)?;
-        table.entry(key).unwrap_or(table).at.line
+        let table = self.root.child(table)?;
+        table.child(key).unwrap_or(table).at.line
     }
 
     /// Reads `text`; `file` is its name in messages. All faults of syntax are reported, not only the first.

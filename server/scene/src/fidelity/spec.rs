@@ -58,9 +58,7 @@ pub(crate) fn fidelity(root: &Section<'_>) -> Option<FidelitySpec> {
         force: section.number("force", Range::Positive),
         update_rate: rate("update_rate", MIN_UPDATES),
         broadcast_rate: rate("broadcast_rate", MIN_STATES),
-        contacts: section
-            .integer("contacts", 0, MAX_CONTACTS)
-            .map(|n| n as u32),
+        contacts: section.integer("contacts", 0, MAX_CONTACTS),
     };
     section.finish();
     wanted.then_some(spec)

@@ -250,12 +250,9 @@ impl Scene {
 pub(super) fn object_name(section: &Section<'_>, example: &str) -> Option<String> {
     let name = section.required_text("name", example)?;
     let complain = |why: &str| {
-        let at = section.at_key("name");
-        let text = format!(
-            "the name {name:?} in {} {why}; write another",
-            section.name()
-        );
-        section.complain(at, text);
+        let of = section.name();
+        let text = format!("the name {name:?} in {of} {why}; write another");
+        section.complain_of("name", text);
     };
     if RESERVED_NAMES.contains(&name) {
         complain("is that of the held body or of a table");

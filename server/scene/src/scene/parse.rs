@@ -13,7 +13,7 @@ use super::spec::{
     BodySpec, EnvironmentSpec, HandPathSpec, MassSpec, MotionSpec, ObstacleSpec, ReferencePoint,
     ScenerySpec, Shape, View,
 };
-use crate::document::{Document, Range, Section, Value};
+use crate::document::{Document, Range, Section, Value, table};
 use crate::fidelity::FidelitySpec;
 use crate::fidelity::spec::fidelity;
 use crate::problem::FileError;
@@ -41,9 +41,8 @@ pub(super) struct SceneSpec {
 fn scene_name(root: &Section<'_>) -> Option<String> {
     let name = root.required_text("name", "name = \"my-scene\"")?;
     if name.contains(char::is_control) {
-        let at = root.at_key("name");
         let text = format!("the name {name:?} has a control character; write another");
-        root.complain(at, text);
+        root.complain_of("name", text);
     }
     Some(name.to_owned())
 }
@@ -52,31 +51,15 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
     let problems = RefCell::new(Vec::new());
     let root = Section::root(&document.root, &problems);
     let name = scene_name(&root);
-    let god_object = match root.section("god_object") {
-        Some(section) => god_object(section),
-        None => {
-            if !root.has("god_object") {
-                root.complain_missing("god_object", "the table [god_object] with shape and mass");
-            }
-            None
-        }
-    };
+    root.require("god_object", "the table [god_object] with shape and mass");
+    let god_object = table(&root, "god_object", god_object).flatten();
     let obstacles = obstacles(&root);
     let scenery = scenery(&root, &obstacles);
-    let coupling = root
-        .section("coupling")
-        .map(CouplingSpec::read)
-        .unwrap_or_default();
-    let limits = root
-        .section("limits")
-        .map(LimitSpec::read)
-        .unwrap_or_default();
-    let method = root
-        .section("method")
-        .map(MethodSpec::read)
-        .unwrap_or_default();
-    let hand = root.section("hand").and_then(hand);
-    let (view, environment) = root.section("view").map(view).unwrap_or_default();
+    let coupling = table(&root, "coupling", CouplingSpec::read).unwrap_or_default();
+    let limits = table(&root, "limits", LimitSpec::read).unwrap_or_default();
+    let method = table(&root, "method", MethodSpec::read).unwrap_or_default();
+    let hand = table(&root, "hand", hand).flatten();
+    let (view, environment) = table(&root, "view", view).unwrap_or_default();
     let fidelity = fidelity(&root);
     root.finish();
     let mut found = problems.into_inner();
@@ -105,16 +88,13 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
     })
 }
 
-fn god_object(section: Section<'_>) -> Option<BodySpec> {
-    let shape_at = section.at_key("shape").clone();
-    let shape = shape(&section).map(Shape::held);
-    let mass = mass(&section);
-    let pose = pose(&section);
-    let reference_point = reference_point(&section);
-    let appearance = appearance(&section);
-    let visual = visual(&section);
-    let at = section.at().clone();
-    section.finish();
+fn god_object(section: &Section<'_>) -> Option<BodySpec> {
+    let shape = shape(section).map(Shape::held);
+    let mass = mass(section);
+    let pose = pose(section);
+    let reference_point = reference_point(section);
+    let appearance = appearance(section);
+    let visual = visual(section);
     Some(BodySpec {
         shape: shape?,
         mass: mass?,
@@ -122,8 +102,8 @@ fn god_object(section: Section<'_>) -> Option<BodySpec> {
         reference_point: reference_point?,
         appearance,
         visual,
-        at,
-        shape_at,
+        at: section.at().clone(),
+        shape_at: section.at_key("shape").clone(),
     })
 }
 
@@ -134,14 +114,9 @@ fn mass(section: &Section<'_>) -> Option<MassSpec> {
         .map(MassSpec::Density);
     match (section.has("mass"), section.has("density")) {
         (true, true) => {
-            let at = section.at_key("density");
-            section.complain(
-                at,
-                format!(
-                    "{} has both `mass` and `density`; leave one out",
-                    section.name()
-                ),
-            );
+            let name = section.name();
+            let text = format!("{name} has both `mass` and `density`; leave one out");
+            section.complain_of("density", text);
             None
         }
         (false, false) => {
@@ -174,27 +149,23 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
         if let Some(name) = &name
             && obstacles.iter().any(|other| other.name == *name)
         {
-            let at = section.at_key("name");
-            section.complain(
-                at,
-                format!("there are two obstacles of the name \"{name}\"; rename one"),
-            );
+            let text = format!("there are two obstacles of the name \"{name}\"; rename one");
+            section.complain_of("name", text);
         }
         let (shape, pose) = (shape(&section), pose(&section));
         let (surface, height_map) = surface(&section);
-        let motion = section.section("motion").and_then(motion);
-        if let Some(written) = section.get("pose").filter(|_| section.has("motion")) {
-            let text = "`pose` in [[obstacle]] has no meaning beside `motion`, whose trace says where the obstacle is; leave it out";
-            section.complain(&written.at, text);
+        let motion = table(&section, "motion", motion).flatten();
+        if section.has("pose") && section.has("motion") {
+            section.fault(
+                "pose",
+                "has no meaning beside `motion`, whose trace says where the obstacle is; leave it out",
+            );
         }
         let appearance = appearance(&section);
         let visual = visual(&section);
-        let at = section.at();
         if obstacles.len() >= MAX_OBSTACLES {
-            section.complain(
-                at,
-                format!("there are more than {MAX_OBSTACLES} obstacles; join some meshes"),
-            );
+            let text = format!("there are more than {MAX_OBSTACLES} obstacles; join some meshes");
+            section.complain(section.at(), text);
             return obstacles;
         }
         section.finish();
@@ -215,50 +186,38 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
     obstacles
 }
 
-fn motion(section: Section<'_>) -> Option<MotionSpec> {
-    let at = section.at_key("trace").clone();
-    let trace = section
-        .required_text("trace", "trace = \"plate.csv\"")
-        .map(str::to_owned);
+fn motion(section: &Section<'_>) -> Option<MotionSpec> {
     let repeat = section.boolean("loop").unwrap_or(false);
-    section.finish();
+    let trace = section.required_text("trace", "trace = \"plate.csv\"")?;
     Some(MotionSpec {
-        trace: trace?,
+        trace: trace.to_owned(),
         repeat,
-        at,
+        at: section.at_key("trace").clone(),
     })
 }
 
-fn hand(section: Section<'_>) -> Option<HandPathSpec> {
-    let at = section.at_key("path").clone();
-    let path = section
-        .required_text("path", "path = \"hand.csv\"")
-        .map(str::to_owned);
+fn hand(section: &Section<'_>) -> Option<HandPathSpec> {
     let repeat = section.boolean("loop").unwrap_or(false);
-    let preset = section
-        .choice("preset", &HandPreset::NAMED)
-        .unwrap_or_default();
-    section.finish();
+    let preset = section.choice("preset", &HandPreset::NAMED);
+    let path = section.required_text("path", "path = \"hand.csv\"")?;
     Some(HandPathSpec {
-        path: path?,
+        path: path.to_owned(),
         repeat,
-        preset,
-        at,
+        preset: preset.unwrap_or_default(),
+        at: section.at_key("path").clone(),
     })
 }
 
-fn view(section: Section<'_>) -> (View, Option<EnvironmentSpec>) {
+fn view(section: &Section<'_>) -> (View, Option<EnvironmentSpec>) {
     let display_scale = section.number_or("display_scale", Range::Positive, 1.0);
     let origin = section
         .numbers::<3>("origin", Range::Finite)
         .map(Point3::from);
-    let rotation = rotation_of(&section);
-    let environment = section.get("environment").zip(section.text("environment"));
-    let environment = environment.map(|(node, path)| EnvironmentSpec {
+    let rotation = rotation_of(section);
+    let environment = section.text("environment").map(|path| EnvironmentSpec {
         path: path.to_owned(),
-        at: node.at.clone(),
+        at: section.at_key("environment").clone(),
     });
-    section.finish();
     let view = View {
         display_scale,
         origin,

@@ -24,22 +24,18 @@ pub(super) fn scenery(root: &Section<'_>, obstacles: &[ObstacleSpec]) -> Vec<Sce
             return scenery;
         }
         let name = object_name(&section, "name = \"room\"");
-        let at = |key| section.at_key(key);
         if let Some(name) = &name {
             let mut others = obstacles.iter().map(|other| &other.name);
             if others.any(|other| other == name) || scenery.iter().any(|other| other.name == *name)
             {
                 let text = format!("there are two bodies of the name \"{name}\"; rename one");
-                section.complain(at("name"), text);
+                section.complain_of("name", text);
             }
         }
-        let shape_at = at("shape").clone();
+        let shape_at = section.at_key("shape").clone();
         let (shape, pose) = (seen_shape(&section), pose(&section));
         let carrier = section.choice("carried_by", &CARRIERS);
-        if let Some(Shape::Mesh {
-            simplify: Some(_), ..
-        }) = &shape
-        {
+        if shape.as_ref().and_then(Shape::simplify).is_some() {
             let text = "`simplify` has no meaning for [[scenery]], which costs no collision detection; leave it out";
             section.complain(&shape_at, text);
         }
@@ -74,8 +70,7 @@ pub(super) fn appearance(body: &Section<'_>) -> Appearance {
 fn color(body: &Section<'_>) -> Option<[f32; 3]> {
     const WANTED: &str =
         "\"#rrggbb\", a CSS name such as \"red\", or [r, g, b] with numbers between 0 and 1";
-    let node = body.get("color")?;
-    match &node.value {
+    match &body.get("color")?.value {
         Value::Array(_) => {
             let parts = body.numbers::<3>("color", Range::UpTo(1.0))?;
             Some(parts.map(|part| part as f32))
@@ -83,21 +78,13 @@ fn color(body: &Section<'_>) -> Option<[f32; 3]> {
         Value::Text(text) => {
             let colour = colour_of_text(text);
             if colour.is_none() {
-                let text = format!(
-                    "`color` in {} is \"{text}\", but must be {WANTED}",
-                    body.name()
-                );
-                body.complain(&node.at, text);
+                body.fault("color", format_args!("is \"{text}\", but must be {WANTED}"));
             }
             colour
         }
         other => {
-            let text = format!(
-                "`color` in {} is {}, but must be {WANTED}",
-                body.name(),
-                other.kind()
-            );
-            body.complain(&node.at, text);
+            let kind = other.kind();
+            body.fault("color", format_args!("is {kind}, but must be {WANTED}"));
             None
         }
     }

@@ -1,7 +1,7 @@
 //! Shapes from mesh files out of a scene file: unit, scale, pieces, simplification.
 
 use super::spec::Shape;
-use crate::document::{Range, Section};
+use crate::document::{Range, Section, table};
 
 /// Units that a mesh file may be in, and what they are in metres.
 pub(crate) const LENGTH_UNITS: [(&str, f64); 6] = [
@@ -32,20 +32,18 @@ fn only(shape: &Section<'_>) -> Vec<String> {
         return Vec::new();
     };
     if names.is_empty() {
-        let at = shape.at_key("only");
-        let text = format!(
-            "`only` in {} names no piece; write names of nodes, objects or groups, as only = [\"peg\"], or leave it out",
-            shape.name()
+        shape.fault(
+            "only",
+            "names no piece; write names of nodes, objects or groups, as only = [\"peg\"], or leave it out",
         );
-        shape.complain(at, text);
     }
     names.into_iter().map(|(name, _)| name.to_owned()).collect()
 }
 
 /// `simplify = { max_error }`: the most distance, m.
 fn simplify(shape: &Section<'_>) -> Option<f64> {
-    let section = shape.section("simplify")?;
-    let max_error = section.required_number("max_error", Range::Positive, "max_error = 1e-4");
-    section.finish();
-    max_error
+    let max_error = table(shape, "simplify", |section| {
+        section.required_number("max_error", Range::Positive, "max_error = 1e-4")
+    });
+    max_error.flatten()
 }

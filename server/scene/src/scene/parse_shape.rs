@@ -1,11 +1,11 @@
 //! Shapes, poses and surfaces out of a scene file.
 
 use god_object::{ForceShading, Pose, SineTexture, Surface, Texture};
-use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::parse_mesh_file::mesh_file;
 use super::spec::{HeightMapMapping, HeightMapSpec, Shape, VisualSpec};
-use crate::document::{Range, Section, Value};
+use crate::document::{Range, Section, Value, table};
 use crate::shapes::{Axis, BoardText, PLATE, board_fault, hole_circumradius};
 use taut_recording::unit_quaternion;
 
@@ -31,9 +31,8 @@ type ReadPrimitive = fn(&Section<'_>) -> Option<Shape>;
 pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
     let shape = shape_of(body, "shape")?;
     if matches!(shape, Shape::Hand { .. } | Shape::Board { .. }) {
-        let at = body.at_key("shape");
         let text = "`hand` and `board` are only seen; write them as the shape of a [[scenery]], or as a `visual`";
-        body.complain(at, text);
+        body.complain_of("shape", text);
         return None;
     }
     Some(shape)
@@ -48,10 +47,7 @@ pub(super) fn seen_shape(body: &Section<'_>) -> Option<Shape> {
 pub(super) fn visual(body: &Section<'_>) -> Option<VisualSpec> {
     let at = body.get("visual")?.at.clone();
     let shape = shape_of(body, "visual")?;
-    if let Shape::Mesh {
-        simplify: Some(_), ..
-    } = &shape
-    {
+    if shape.simplify().is_some() {
         let text = "`simplify` has no meaning for `visual`, which costs no collision detection; leave it out";
         body.complain(&at, text);
     }
@@ -59,15 +55,11 @@ pub(super) fn visual(body: &Section<'_>) -> Option<VisualSpec> {
 }
 
 fn shape_of(body: &Section<'_>, key: &'static str) -> Option<Shape> {
-    let Some(shape) = body.section(key) else {
-        if key == "shape" && !body.has(key) {
-            body.complain_missing(
-                "shape",
-                "shape = { mesh = \"body.ply\" } or { sphere = { radius = 0.01 } }",
-            );
-        }
-        return None;
-    };
+    if key == "shape" {
+        let example = "shape = { mesh = \"body.ply\" } or { sphere = { radius = 0.01 } }";
+        body.require(key, example);
+    }
+    let shape = body.section(key)?;
     let mut found = Vec::new();
     found.extend(mesh_file(&shape).map(Some));
     let primitives: [(&'static str, ReadPrimitive); 8] = [
@@ -88,7 +80,6 @@ fn shape_of(body: &Section<'_>, key: &'static str) -> Option<Shape> {
             found.push(None); // already complained of
         }
     }
-    let at = shape.at();
     let count = found.len();
     let wrong_mesh = shape.has("mesh") && count == 0;
     if count != 1 && !wrong_mesh {
@@ -96,14 +87,10 @@ fn shape_of(body: &Section<'_>, key: &'static str) -> Option<Shape> {
             "{} names {count} forms, but must name one: mesh, sphere, box, capsule, cylinder, box_with_hole or plane",
             shape.name()
         );
-        shape.complain(at, text);
+        shape.complain(shape.at(), text);
     }
     shape.finish();
-    if count == 1 {
-        found.pop().flatten()
-    } else {
-        None
-    }
+    found.pop().flatten().filter(|_| count == 1)
 }
 
 fn axis(section: &Section<'_>, default: Axis) -> Axis {
@@ -111,9 +98,7 @@ fn axis(section: &Section<'_>, default: Axis) -> Axis {
 }
 
 fn facets(section: &Section<'_>, (low, high): (i64, i64)) -> Option<usize> {
-    section
-        .integer("facets", low, high)
-        .and_then(|n| usize::try_from(n).ok())
+    section.integer("facets", low, high)
 }
 
 fn radius(section: &Section<'_>) -> Option<f64> {
@@ -125,16 +110,12 @@ fn half_length(section: &Section<'_>) -> Option<f64> {
 }
 
 fn half_extents(section: &Section<'_>) -> Option<[f64; 3]> {
-    if !section.has("half_extents") {
-        section.complain_missing("half_extents", "half_extents = [0.03, 0.03, 0.03]");
-    }
+    section.require("half_extents", "half_extents = [0.03, 0.03, 0.03]");
     section.numbers("half_extents", Range::Positive)
 }
 
 fn sphere(section: &Section<'_>) -> Option<Shape> {
-    let subdivisions = section
-        .integer("subdivisions", 0, MAX_SUBDIVISIONS)
-        .map(|n| n as u32);
+    let subdivisions = section.integer("subdivisions", 0, MAX_SUBDIVISIONS);
     Some(Shape::Sphere {
         radius: radius(section)?,
         subdivisions,
@@ -234,26 +215,23 @@ fn board(section: &Section<'_>) -> Option<Shape> {
 
 /// `pose = { position, rotation }`; what is left out is zero or no rotation.
 pub(super) fn pose(body: &Section<'_>) -> Option<Pose> {
-    let Some(section) = body.section("pose") else {
-        return (!body.has("pose")).then(Pose::identity);
-    };
-    let pose = pose_of(&section);
-    section.finish();
-    pose
+    if !body.has("pose") {
+        return Some(Pose::identity());
+    }
+    table(body, "pose", pose_of).flatten()
 }
 
 /// The pose in a table that holds `position` and `rotation`.
 pub(crate) fn pose_of(section: &Section<'_>) -> Option<Pose> {
-    let position = position_or_zero(section, "position");
-    let rotation = if section.has("rotation") {
-        rotation_of(section)?
-    } else {
-        UnitQuaternion::identity()
+    let position = match section.has("position") {
+        true => section.numbers::<3>("position", Range::Finite),
+        false => Some([0.0; 3]),
     };
-    Some(Pose::from_parts(
-        Translation3::from(position?.coords),
-        rotation,
-    ))
+    let rotation = match section.has("rotation") {
+        true => rotation_of(section)?,
+        false => UnitQuaternion::identity(),
+    };
+    Some(Pose::from_parts(Translation3::from(position?), rotation))
 }
 
 /// `rotation`, w x y z, if it is there and a rotation.
@@ -261,61 +239,47 @@ pub(crate) fn rotation_of(section: &Section<'_>) -> Option<UnitQuaternion<f64>> 
     let wxyz = section.numbers::<4>("rotation", Range::Finite)?;
     unit_quaternion(wxyz)
         .map_err(|text| {
-            let at = section.at_key("rotation");
-            section.complain(at, format!("`rotation` in {}: {text}", section.name()));
+            let text = format!("`rotation` in {}: {text}", section.name());
+            section.complain_of("rotation", text);
         })
         .ok()
 }
 
-fn position_or_zero(section: &Section<'_>, key: &'static str) -> Option<Point3<f64>> {
-    if section.has(key) {
-        section.numbers::<3>(key, Range::Finite).map(Point3::from)
-    } else {
-        Some(Point3::origin())
-    }
-}
-
 /// `surface = { shading, texture, friction }`, all optional.
 pub(super) fn surface(body: &Section<'_>) -> (Surface, Option<HeightMapSpec>) {
-    let mut surface = Surface::default();
-    let mut map = None;
-    let Some(section) = body.section("surface") else {
-        return (surface, map);
+    table(body, "surface", surface_of).unwrap_or_default()
+}
+
+fn surface_of(section: &Section<'_>) -> (Surface, Option<HeightMapSpec>) {
+    let angle = table(section, "shading", |shading| {
+        shading.required_number("crease_angle", Range::UpTo(HALF_TURN), "crease_angle = 0.6")
+    });
+    let (sine, map) = table(section, "texture", texture).unwrap_or_default();
+    let surface = Surface {
+        shading: angle
+            .flatten()
+            .map(|crease_angle| ForceShading { crease_angle }),
+        texture: sine.map(Texture::Sine),
+        friction: section.number_or("friction", Range::NotNegative, 0.0),
     };
-    if let Some(shading) = section.section("shading") {
-        let angle =
-            shading.required_number("crease_angle", Range::UpTo(HALF_TURN), "crease_angle = 0.6");
-        surface.shading = angle.map(|crease_angle| ForceShading { crease_angle });
-        shading.finish();
-    }
-    if let Some(texture) = section.section("texture") {
-        match (texture.has("sine"), texture.has("height_map")) {
-            (true, true) => texture.complain(
-                texture.at(),
-                format!(
-                    "{} has both `sine` and `height_map`; leave one out",
-                    texture.name()
-                ),
-            ),
-            (false, false) => texture.complain_missing(
-                "sine",
-                "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 } or height_map = { file = \"leather.png\", tile = 0.05, amplitude = 2e-4 }",
-            ),
-            _ => {}
-        }
-        if let Some(sine) = texture.section("sine") {
-            surface.texture = sine_texture(&sine).map(Texture::Sine);
-            sine.finish();
-        }
-        if let Some(section) = texture.section("height_map") {
-            map = height_map(&section);
-            section.finish();
-        }
-        texture.finish();
-    }
-    surface.friction = section.number_or("friction", Range::NotNegative, 0.0);
-    section.finish();
     (surface, map)
+}
+
+fn texture(section: &Section<'_>) -> (Option<SineTexture>, Option<HeightMapSpec>) {
+    match (section.has("sine"), section.has("height_map")) {
+        (true, true) => {
+            let name = section.name();
+            let text = format!("{name} has both `sine` and `height_map`; leave one out");
+            section.complain(section.at(), text);
+        }
+        (false, false) => section.complain_missing(
+            "sine",
+            "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 } or height_map = { file = \"leather.png\", tile = 0.05, amplitude = 2e-4 }",
+        ),
+        _ => {}
+    }
+    let sine = table(section, "sine", sine_texture).flatten();
+    (sine, table(section, "height_map", height_map).flatten())
 }
 
 fn height_map(section: &Section<'_>) -> Option<HeightMapSpec> {
@@ -323,13 +287,10 @@ fn height_map(section: &Section<'_>) -> Option<HeightMapSpec> {
     let amplitude = section.required_number("amplitude", Range::NotNegative, "amplitude = 2e-4");
     let by_coordinates = section.choice("mapping", &[("triplanar", false), ("uv", true)]);
     let mapping = if by_coordinates.unwrap_or(false) {
-        if let Some(tile) = section.get("tile") {
-            section.complain(
-                &tile.at,
-                format!(
-                    "`tile` in {} has no meaning with mapping = \"uv\", where the picture covers 0 to 1 of the mesh's texture coordinates; leave it out",
-                    section.name()
-                ),
+        if section.has("tile") {
+            section.fault(
+                "tile",
+                "has no meaning with mapping = \"uv\", where the picture covers 0 to 1 of the mesh's texture coordinates; leave it out",
             );
         }
         Some(HeightMapMapping::Uv)
@@ -357,13 +318,7 @@ fn sine_texture(sine: &Section<'_>) -> Option<SineTexture> {
             let direction = sine.numbers::<3>("axis", Range::Finite).map(Vector3::from);
             let unit = direction.and_then(|d| Unit::try_new(d, f64::MIN_POSITIVE));
             if direction.is_some() && unit.is_none() {
-                sine.complain(
-                    &node.at,
-                    format!(
-                        "`axis` in {} has no direction; write a vector that is not zero",
-                        sine.name()
-                    ),
-                );
+                sine.fault("axis", "has no direction; write a vector that is not zero");
             }
             unit.map(Unit::into_inner)
         }

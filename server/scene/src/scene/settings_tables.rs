@@ -4,7 +4,7 @@
 use god_object::{Adaptation, RotationMetric, Settings, SolverKind};
 use taut_proto::range::STIFFNESS;
 
-use crate::document::{Range, Section, Value};
+use crate::document::{Range, Section, Value, table};
 
 /// Largest capacity or iteration limit. More is a slip of the keyboard.
 const MAX_COUNT: i64 = 1_000_000;
@@ -21,10 +21,8 @@ macro_rules! settings_table {
 
         impl $Table {
             /// The table as it is written.
-            pub(super) fn read(section: Section<'_>) -> Self {
-                let table = Self { $( $key: ($read)(&section, stringify!($key)), )* };
-                section.finish();
-                table
+            pub(super) fn read(section: &Section<'_>) -> Self {
+                Self { $( $key: ($read)(section, stringify!($key)), )* }
             }
 
             /// Overrides the settings whose keys are written.
@@ -94,15 +92,15 @@ settings_table! {
         /// m.
         pub motion_tolerance: f64 = number(Range::Positive) => motion_tolerance;
         /// Rows in the constraint set.
-        pub max_constraints: usize = integer(1, MAX_COUNT, |n| n as usize) => max_constraints;
+        pub max_constraints: usize = integer(1, MAX_COUNT) => max_constraints;
         /// Repetitions within one update.
-        pub max_substeps: u32 = integer(1, MAX_COUNT, |n| n as u32) => max_substeps;
+        pub max_substeps: u32 = integer(1, MAX_COUNT) => max_substeps;
         /// Rounds of implicit constraints, 0 to 3.
-        pub implicit_rounds: u32 = integer(0, 3, |n| n as u32) => implicit_rounds;
+        pub implicit_rounds: u32 = integer(0, 3) => implicit_rounds;
         /// Evaluations in one collision search.
-        pub max_advancement_steps: u32 = integer(1, MAX_COUNT, |n| n as u32) => max_advancement_steps;
+        pub max_advancement_steps: u32 = integer(1, MAX_COUNT) => max_advancement_steps;
         /// Nominal microseconds of work of one update.
-        pub work_budget: Option<u64> = integer(1, i64::MAX, |n| Some(n as u64)) => work_budget;
+        pub work_budget: Option<u64> = work_budget => work_budget;
         /// Solver of the projections.
         pub solver: SolverKind = solver => solver;
     }
@@ -113,12 +111,15 @@ fn number(range: Range) -> impl Fn(&Section<'_>, &'static str) -> Option<f64> {
 }
 
 /// A whole number from `low` to `high`.
-fn integer<T>(
+fn integer<T: TryFrom<i64>>(
     low: i64,
     high: i64,
-    convert: fn(i64) -> T,
 ) -> impl Fn(&Section<'_>, &'static str) -> Option<T> {
-    move |section, key| section.integer(key, low, high).map(convert)
+    move |section, key| section.integer(key, low, high)
+}
+
+fn work_budget(section: &Section<'_>, key: &'static str) -> Option<Option<u64>> {
+    section.integer(key, 1, i64::MAX).map(Some)
 }
 
 fn rotation_metric(section: &Section<'_>, key: &'static str) -> Option<RotationMetric> {
@@ -134,22 +135,18 @@ fn adaptation(section: &Section<'_>, key: &'static str) -> Option<Option<Adaptat
     if let Some(Value::Boolean(false)) = section.get(key).map(|node| &node.value) {
         return Some(None);
     }
-    let table = section.section(key)?;
     let default = Adaptation::default();
-    let adaptation = Adaptation {
+    let read = |table: &Section<'_>| Adaptation {
         duration: table.number_or("duration", Range::NotNegative, default.duration),
         threshold: table.number_or("threshold", Range::NotPositive, default.threshold),
     };
-    table.finish();
-    Some(Some(adaptation))
+    table(section, key, read).map(Some)
 }
 
 fn solver(section: &Section<'_>, key: &'static str) -> Option<SolverKind> {
-    section.choice(
-        key,
-        &[
-            ("active-set", SolverKind::ActiveSet),
-            ("clarabel", SolverKind::Clarabel),
-        ],
-    )
+    let solvers = [
+        ("active-set", SolverKind::ActiveSet),
+        ("clarabel", SolverKind::Clarabel),
+    ];
+    section.choice(key, &solvers)
 }

@@ -11,14 +11,8 @@ pub(super) fn admission(section: &Section<'_>) -> JoinPolicy {
     let mut policy = JoinPolicy::default();
     if section.has("roles") {
         policy.roles = list::<Role>(section, "roles");
-        if let Some(node) = section.get("roles").filter(|_| policy.roles.is_empty()) {
-            section.complain(
-                &node.at,
-                format!(
-                    "`roles` in {} lets nobody in; name at least one role",
-                    section.name()
-                ),
-            );
+        if policy.roles.is_empty() {
+            section.fault("roles", "lets nobody in; name at least one role");
         }
     }
     policy.revoked = list::<Revoked>(section, "revoked");

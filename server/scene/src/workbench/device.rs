@@ -3,9 +3,9 @@
 use taut_kinds::{Chosen, KINDS, Key, Kind, KindId, Takes, Value};
 use taut_plant::HandPreset;
 
-use super::parts::{Files, table};
+use super::parts::Files;
 use super::spec::Device;
-use crate::document::{Range, Section};
+use crate::document::{Range, Section, table};
 use crate::scene::pose_of;
 
 /// The device of a workbench that says nothing of it.
@@ -23,9 +23,7 @@ pub(super) fn device(root: &Section<'_>, files: &Files<'_>) -> Option<Device> {
 }
 
 fn device_of(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
-    if !section.has("kind") {
-        section.complain_missing("kind", "kind = \"simulated\"");
-    }
+    section.require("kind", "kind = \"simulated\"");
     let kinds = KINDS.each_ref().map(|kind| (kind.name, kind));
     let Some(kind) = section.choice("kind", &kinds) else {
         // Which keys belong here depends on the kind: complain of nothing else.
@@ -91,12 +89,7 @@ fn value(section: &Section<'_>, key: &Key, files: &Files<'_>) -> Option<Value> {
             section.choice(name, &words).map(Value::Word)
         }
         Takes::YesOrNo => section.boolean(name).map(Value::Yes),
-        Takes::Pose => {
-            let table = section.section(name)?;
-            let pose = pose_of(&table);
-            table.finish();
-            pose.map(Value::Pose)
-        }
+        Takes::Pose => table(section, name, pose_of).flatten().map(Value::Pose),
         Takes::File => files.path(section, name).map(Value::File),
         Takes::NameOrFile(_) => {
             let named = section.text(name)?;
@@ -106,15 +99,8 @@ fn value(section: &Section<'_>, key: &Key, files: &Files<'_>) -> Option<Value> {
             let text = section.text(name)?;
             let value = key.takes.read(text);
             if value.is_none() {
-                let at = section.at_key(name);
                 let wanted = key.takes.wanted();
-                section.complain(
-                    at,
-                    format!(
-                        "`{name}` in {} is \"{text}\", but must be {wanted}",
-                        section.name()
-                    ),
-                );
+                section.fault(name, format_args!("is \"{text}\", but must be {wanted}"));
             }
             value
         }

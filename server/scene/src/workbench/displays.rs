@@ -3,9 +3,8 @@
 use nalgebra::Point3;
 
 use super::output::{fault_of_node, output};
-use super::parts::table;
 use super::spec::{Node, Screen, Stereo, Window};
-use crate::document::{Range, Section};
+use crate::document::{Range, Section, table};
 
 /// Shortest edge of a screen, m. Shorter is a slip of the unit.
 const MIN_SCREEN_EDGE: f64 = 0.01;
@@ -19,9 +18,7 @@ pub(super) fn screens(root: &Section<'_>) -> Vec<Screen> {
     for section in root.sections("screen") {
         let name = unique_name(&section, "screen", screens.iter().map(|s| s.name.as_str()));
         let corner = |key: &'static str| {
-            if !section.has(key) {
-                section.complain_missing(key, &format!("{key} = [x, y, z] (m)"));
-            }
+            section.require(key, &format!("{key} = [x, y, z] (m)"));
             section.numbers::<3>(key, Range::Finite).map(Point3::from)
         };
         let corners = (
@@ -51,9 +48,7 @@ pub(super) fn screens(root: &Section<'_>) -> Vec<Screen> {
         }
         section.finish();
     }
-    if screens.is_empty() && !root.has("screen") {
-        root.complain_missing("screen", "at least one [[screen]] with three corners");
-    }
+    root.require("screen", "at least one [[screen]] with three corners");
     screens
 }
 
@@ -63,11 +58,10 @@ pub(super) fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
         let name = unique_name(&section, "node", nodes.iter().map(|n| n.name.as_str()));
         let drawn = screens_of(&section, screens);
         let stereo = section.choice("stereo", &Stereo::NAMED).unwrap_or_default();
-        let at = section.at_key("stereo");
         let named = name.as_deref().unwrap_or_default();
         for screen in screens.iter().filter(|screen| drawn.contains(&screen.name)) {
             if let Some(text) = fault_of_node(named, stereo, screen) {
-                section.complain(at, text);
+                section.complain_of("stereo", text);
             }
         }
         let window = table(&section, "window", window).unwrap_or(PLAIN_WINDOW);
@@ -81,46 +75,32 @@ pub(super) fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
             });
         }
     }
-    if nodes.is_empty() && !root.has("node") {
-        root.complain_missing("node", "at least one [[node]] with name and screens");
-    }
+    root.require("node", "at least one [[node]] with name and screens");
     nodes
 }
 
 /// The screens that a node draws, those included that do not exist: what hangs on them is not complained of again.
 fn screens_of(section: &Section<'_>, screens: &[Screen]) -> Vec<String> {
-    if !section.has("screens") {
-        section.complain_missing("screens", "screens = [\"front\"]");
-    }
+    section.require("screens", "screens = [\"front\"]");
+    let name = section.name();
     let mut drawn = Vec::new();
     for (screen, at) in section.texts("screens").unwrap_or_default() {
         if !screens.iter().any(|known| known.name == screen) {
             let known: Vec<&str> = screens.iter().map(|s| s.name.as_str()).collect();
+            let known = known.join(", ");
             let text = format!(
-                "{} draws the screen \"{screen}\", which does not exist; known screens: {}",
-                section.name(),
-                known.join(", ")
+                "{name} draws the screen \"{screen}\", which does not exist; known screens: {known}"
             );
             section.complain(at, text);
         } else if drawn.iter().any(|other| other == screen) {
-            section.complain(
-                at,
-                format!(
-                    "{} draws the screen \"{screen}\" twice; remove one",
-                    section.name()
-                ),
-            );
+            let text = format!("{name} draws the screen \"{screen}\" twice; remove one");
+            section.complain(at, text);
         }
         drawn.push(screen.to_owned());
     }
-    if let Some(list) = section.get("screens").filter(|_| drawn.is_empty()) {
-        section.complain(
-            &list.at,
-            format!(
-                "{} draws no screen; name at least one in `screens`",
-                section.name()
-            ),
-        );
+    if drawn.is_empty() && section.has("screens") {
+        let text = format!("{name} draws no screen; name at least one in `screens`");
+        section.complain_of("screens", text);
     }
     drawn
 }
@@ -134,11 +114,7 @@ const PLAIN_WINDOW: Window = Window {
 };
 
 fn window(section: &Section<'_>) -> Window {
-    let pixels = |key, default| {
-        section
-            .integer(key, 16, MAX_PIXELS)
-            .map_or(default, |n| n as u32)
-    };
+    let pixels = |key, default| section.integer(key, 16, MAX_PIXELS).unwrap_or(default);
     Window {
         width: pixels("width", PLAIN_WINDOW.width),
         height: pixels("height", PLAIN_WINDOW.height),
@@ -154,11 +130,8 @@ pub(super) fn unique_name<'n>(
 ) -> Option<String> {
     let name = section.required_text("name", &format!("name = \"{kind}-1\""))?;
     if others.any(|other| other == name) {
-        let at = section.at_key("name");
-        section.complain(
-            at,
-            format!("there are two {kind}s of the name \"{name}\"; rename one"),
-        );
+        let text = format!("there are two {kind}s of the name \"{name}\"; rename one");
+        section.complain_of("name", text);
     }
     Some(name.to_owned())
 }

@@ -53,13 +53,9 @@ pub(super) fn frames(section: &Section<'_>) -> Frames {
         .number("least_rate", rates)
         .unwrap_or(default.least_rate.min(rate));
     if least_rate > rate {
-        let at = section.at_key("least_rate");
-        section.complain(
-            at,
-            format!(
-                "`least_rate` in {} is {least_rate}, above the `rate` of {rate}: every node would swap on its own; choose one that the slowest node keeps",
-                section.name()
-            ),
+        section.fault(
+            "least_rate",
+            format_args!("is {least_rate}, above the `rate` of {rate}: every node would swap on its own; choose one that the slowest node keeps"),
         );
     }
     Frames {

@@ -125,18 +125,17 @@ impl ObserverStream {
 
 pub(super) fn vrpn(section: &Section<'_>) -> Vrpn {
     let default = Vrpn::default();
-    let address = bind(section, IpAddr::V4(default.bind));
-    if let (Some(IpAddr::V6(_)), Some(node)) = (address, section.get("bind")) {
-        let text =
-            "`bind` in [vrpn] is an IPv6 address, which VRPN does not know; write an IPv4 one";
-        section.complain(&node.at, text);
-    }
+    let bind = match bind(section, IpAddr::V4(default.bind)) {
+        IpAddr::V4(address) => address,
+        IpAddr::V6(_) => {
+            let what = "is an IPv6 address, which VRPN does not know; write an IPv4 one";
+            section.fault("bind", what);
+            default.bind
+        }
+    };
     Vrpn {
         enabled: section.boolean("enabled").unwrap_or(false),
-        bind: match address {
-            Some(IpAddr::V4(address)) => address,
-            _ => default.bind,
-        },
+        bind,
         port: port(section, "port", default.port),
         rate: rate(section, MAX_RATE, default.rate),
         tracker: name(section, "tracker").unwrap_or(default.tracker),
@@ -148,17 +147,16 @@ pub(super) fn observers(section: &Section<'_>, files: &Files<'_>) -> ObserverStr
     let default = ObserverStream::default();
     let stream = ObserverStream {
         enabled: section.boolean("enabled").unwrap_or(false),
-        bind: bind(section, default.bind).unwrap_or(default.bind),
+        bind: bind(section, default.bind),
         port: port(section, "port", default.port),
         rate: rate(section, MAX_LINE_RATE, default.rate),
         token_file: files.path(section, "token_file"),
         max_observers: most(section, "max_observers", default.max_observers),
     };
     if stream.enabled && !stream.bind.is_loopback() && stream.token_file.is_none() {
-        let at = section.at_key("bind");
-        section.complain(
-            at,
-            "`bind` in [observers] lets other machines in, but there is no token; name one by token_file = \"observers.token\", or bind to \"127.0.0.1\"",
+        section.fault(
+            "bind",
+            "lets other machines in, but there is no token; name one by token_file = \"observers.token\", or bind to \"127.0.0.1\"",
         );
     }
     stream
@@ -166,31 +164,20 @@ pub(super) fn observers(section: &Section<'_>, files: &Files<'_>) -> ObserverStr
 
 pub(super) fn zenoh(section: &Section<'_>, files: &Files<'_>) -> Zenoh {
     let default = Zenoh::default();
-    let routers = section.texts("connect").unwrap_or_default();
     let zenoh = Zenoh {
         enabled: section.boolean("enabled").unwrap_or(false),
         name: name(section, "name").unwrap_or(default.name),
-        connect: routers
-            .into_iter()
-            .map(|(router, _)| router.to_owned())
-            .collect(),
+        connect: section.words("connect"),
         config: files.path(section, "config"),
         rate: rate(section, MAX_RATE, default.rate),
         ros: section.boolean("ros").unwrap_or(false),
         ros_domain: section
             .integer("ros_domain", 0, LAST_ROS_DOMAIN)
-            .and_then(|domain| u8::try_from(domain).ok())
             .unwrap_or(default.ros_domain),
     };
     if zenoh.ros && !is_word(&zenoh.name) {
-        let at = section.at_key("name");
-        section.complain(
-            at,
-            format!(
-                "`name` in [zenoh] is \"{}\", which is no namespace of ROS 2; write letters, digits and `_`, no digit first, or ros = false",
-                zenoh.name
-            ),
-        );
+        let what = "which is no namespace of ROS 2; write letters, digits and `_`, no digit first, or ros = false";
+        section.fault("name", format_args!("is \"{}\", {what}", zenoh.name));
     }
     if zenoh.enabled && zenoh.connect.is_empty() && zenoh.config.is_none() {
         let text = "[zenoh] names no router; write connect = [\"tcp/router.example:7447\"], or config = \"zenoh.json5\"";
@@ -205,10 +192,7 @@ fn rate(section: &Section<'_>, fastest: f64, default: f64) -> f64 {
 }
 
 fn most(section: &Section<'_>, key: &'static str, default: usize) -> usize {
-    section
-        .integer(key, 1, MAX_CLIENTS)
-        .and_then(|most| usize::try_from(most).ok())
-        .unwrap_or(default)
+    section.integer(key, 1, MAX_CLIENTS).unwrap_or(default)
 }
 
 /// A name that needs no quoting anywhere.
@@ -216,14 +200,8 @@ fn name(section: &Section<'_>, key: &'static str) -> Option<String> {
     let text = section.text(key)?;
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     if text.is_empty() || text.len() > MAX_NAME || !text.chars().all(is_plain) {
-        let at = section.at_key(key);
-        section.complain(
-            at,
-            format!(
-                "`{key}` in {} is \"{text}\"; write 1 to {MAX_NAME} letters, digits, `-`, `_` or `.`",
-                section.name()
-            ),
-        );
+        let wanted = format_args!("1 to {MAX_NAME} letters, digits, `-`, `_` or `.`");
+        section.fault(key, format_args!("is \"{text}\"; write {wanted}"));
         return None;
     }
     Some(text.to_owned())

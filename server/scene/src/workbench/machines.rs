@@ -40,12 +40,7 @@ fn machine(section: &Section<'_>, others: &[Machine]) -> Option<Machine> {
     let address = section.required_text("address", "address = \"192.0.2.10\"");
     let machine = Machine {
         server: section.boolean("server").unwrap_or(false),
-        nodes: section
-            .texts("nodes")
-            .unwrap_or_default()
-            .into_iter()
-            .map(|(node, _)| node.to_owned())
-            .collect(),
+        nodes: section.words("nodes"),
         device: section.text("device").map(str::to_owned),
         tracker: section.text("tracker").map(str::to_owned),
         name: plain_name(section, name?)?,
@@ -66,13 +61,10 @@ fn plain_name(section: &Section<'_>, name: String) -> Option<String> {
     if is_machine_name(&name) {
         return Some(name);
     }
-    complain(
-        section,
-        "name",
-        format!(
-            "the machine's name \"{name}\" is to be a file's name: write 1 to {MAX_NAME} letters, digits, `-`, `_` or `.`, a letter or digit first"
-        ),
+    let text = format!(
+        "the machine's name \"{name}\" is to be a file's name: write 1 to {MAX_NAME} letters, digits, `-`, `_` or `.`, a letter or digit first"
     );
+    section.complain_of("name", text);
     None
 }
 
@@ -81,64 +73,44 @@ fn address_of(section: &Section<'_>, text: &str) -> Option<IpAddr> {
     let address = text.parse::<IpAddr>().ok();
     let address = address.filter(|ip| !ip.is_unspecified() && !ip.is_multicast());
     if address.is_none() {
-        complain(
-            section,
-            "address",
-            format!(
-                "`address` is \"{text}\", which is no machine's; write its IP address on the workbench's network, such as \"192.0.2.10\""
-            ),
+        let text = format!(
+            "`address` is \"{text}\", which is no machine's; write its IP address on the workbench's network, such as \"192.0.2.10\""
         );
+        section.complain_of("address", text);
     }
     address
-}
-
-fn complain(section: &Section<'_>, key: &'static str, text: String) {
-    let at = section.at_key(key);
-    section.complain(at, text);
 }
 
 /// What is wrong with one machine, beside those before it.
 fn complain_of(section: &Section<'_>, machine: &Machine, others: &[Machine], named: &Named<'_>) {
     let name = &machine.name;
     if let Some(other) = others.iter().find(|other| other.address == machine.address) {
-        complain(
-            section,
-            "address",
-            format!(
-                "{} and {name} have the same address; write each machine's own, or make them one machine",
-                other.name
-            ),
+        let text = format!(
+            "{} and {name} have the same address; write each machine's own, or make them one machine",
+            other.name
         );
+        section.complain_of("address", text);
     }
     let of_other_kind = |other: &&Machine| other.address.is_ipv4() != machine.address.is_ipv4();
     if let Some(other) = others.iter().find(of_other_kind) {
-        complain(
-            section,
-            "address",
-            format!(
-                "{name} has the address {} and {} has {}: one of IPv4 and one of IPv6, between which nothing passes; write addresses of one kind for all",
-                machine.address, other.name, other.address
-            ),
+        let text = format!(
+            "{name} has the address {} and {} has {}: one of IPv4 and one of IPv6, between which nothing passes; write addresses of one kind for all",
+            machine.address, other.name, other.address
         );
+        section.complain_of("address", text);
     }
     complain_of_nodes(section, machine, others, named);
     if machine.device.is_some() && !matches!(named.device, Some(Device::Remote) | None) {
-        complain(
-            section,
-            "device",
-            format!(
-                "{name} has a device, but the server reads its own; write kind = \"remote\" in [device], or take `device` out here"
-            ),
+        let text = format!(
+            "{name} has a device, but the server reads its own; write kind = \"remote\" in [device], or take `device` out here"
         );
+        section.complain_of("device", text);
     }
     if machine.tracker.is_some() && !matches!(named.tracking, Some(HeadTracking::Remote) | None) {
-        complain(
-            section,
-            "tracker",
-            format!(
-                "{name} has a head tracker, but [viewer] does not wait for one; write remote_tracker = true there, or take `tracker` out here"
-            ),
+        let text = format!(
+            "{name} has a head tracker, but [viewer] does not wait for one; write remote_tracker = true there, or take `tracker` out here"
         );
+        section.complain_of("tracker", text);
     }
     let does_nothing = !machine.server
         && machine.nodes.is_empty()
@@ -160,41 +132,30 @@ fn complain_of_nodes(
     named: &Named<'_>,
 ) {
     let name = &machine.name;
+    let complain = |text: String| section.complain_of("nodes", text);
     for (place, node) in machine.nodes.iter().enumerate() {
         let elsewhere = others.iter().find(|other| other.nodes.contains(node));
         if !named.nodes.iter().any(|known| known.name == *node) {
             let known: Vec<&str> = named.nodes.iter().map(|n| n.name.as_str()).collect();
-            complain(
-                section,
-                "nodes",
-                format!(
-                    "{name} runs the node \"{node}\", which does not exist; known nodes: {}",
-                    known.join(", ")
-                ),
-            );
-        } else if let Some(other) = elsewhere {
-            complain(
-                section,
-                "nodes",
-                format!(
-                    "the node \"{node}\" runs on {} and on {name}; take it out of one",
-                    other.name
-                ),
-            );
+            let known = known.join(", ");
+            complain(format!(
+                "{name} runs the node \"{node}\", which does not exist; known nodes: {known}"
+            ));
+        } else if let Some(Machine { name: other, .. }) = elsewhere {
+            complain(format!(
+                "the node \"{node}\" runs on {other} and on {name}; take it out of one"
+            ));
         } else if machine.nodes[..place].contains(node) {
-            complain(
-                section,
-                "nodes",
-                format!("{name} names the node \"{node}\" twice; remove one"),
-            );
+            complain(format!(
+                "{name} names the node \"{node}\" twice; remove one"
+            ));
         }
     }
 }
 
 /// What is wrong with the machines together.
 fn complain_of_all(root: &Section<'_>, machines: &[Machine], named: &Named<'_>) {
-    let at = root.at_key("machine");
-    let complain = |text: String| root.complain(at, text);
+    let complain = |text: String| root.complain_of("machine", text);
     let count = |of: fn(&Machine) -> bool| machines.iter().filter(|machine| of(machine)).count();
     match count(|machine| machine.server) {
         1 => {}

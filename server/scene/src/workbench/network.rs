@@ -6,7 +6,7 @@ use taut_proto::{JoinPolicy, barrier::MAX_MEMBERS};
 
 use super::admission::admission;
 use super::frames::{FrameSwap, Frames};
-use super::parts::{Files, MAX_RATE, MIN_STATES, bind, port};
+use super::parts::{Files, MAX_RATE, MIN_STATES, bind, ports};
 use super::spec::{AlsoKeyFile, Network, TransportKind};
 use crate::document::{Range, Section};
 
@@ -28,22 +28,14 @@ fn multicast(
     transport: TransportKind,
     bind: IpAddr,
 ) -> (SocketAddrV4, Ipv4Addr) {
-    let complain = |key: &'static str, text: String| {
-        let at = section.at_key(key);
-        section.complain(at, text);
-    };
     let group = match section.text("multicast_group") {
         None => DEFAULT_GROUP,
         Some(text) => match text.parse::<SocketAddrV4>() {
             Ok(group) if group.ip().is_multicast() && group.port() != 0 => group,
             _ => {
-                complain(
-                    "multicast_group",
-                    format!(
-                        "`multicast_group` in {} is \"{text}\", which is no multicast address with a port; write one such as \"{DEFAULT_GROUP}\"",
-                        section.name()
-                    ),
-                );
+                let what = "which is no multicast address with a port; write one such as";
+                let what = format!("is \"{text}\", {what} \"{DEFAULT_GROUP}\"");
+                section.fault("multicast_group", what);
                 DEFAULT_GROUP
             }
         },
@@ -58,13 +50,11 @@ fn multicast(
         (None, _) => None,
     };
     if interface.is_none() {
-        complain(
-            "multicast_interface",
-            format!(
-                "{} does not say from which interface multicast leaves; write its address, such as multicast_interface = \"192.168.1.5\"",
-                section.name()
-            ),
+        let text = format!(
+            "{} does not say from which interface multicast leaves; write its address, such as multicast_interface = \"192.168.1.5\"",
+            section.name()
         );
+        section.complain_of("multicast_interface", text);
     }
     (group, interface.unwrap_or(Ipv4Addr::LOCALHOST))
 }
@@ -75,8 +65,8 @@ fn also_key(section: &Section<'_>, files: &Files<'_>) -> Option<AlsoKeyFile> {
     let until = section.text("also_key_until").and_then(|text| {
         let time = humantime::parse_rfc3339(text).ok();
         if time.is_none() {
-            let at = section.at_key("also_key_until");
-            section.complain(at, format!("`also_key_until` in {} is \"{text}\", which is no time; write one in UTC such as \"2030-01-31T12:00:00Z\"", section.name()));
+            let what = "which is no time; write one in UTC such as \"2030-01-31T12:00:00Z\"";
+            section.fault("also_key_until", format_args!("is \"{text}\", {what}"));
         }
         time
     });
@@ -102,30 +92,24 @@ fn also_key(section: &Section<'_>, files: &Files<'_>) -> Option<AlsoKeyFile> {
 
 /// Whether everybody whom the workbench names finds room.
 pub(super) fn places(root: &Section<'_>, network: &Network, nodes: usize, frames: &Frames) {
-    let at = root.at_key("network");
     let needed = nodes + SINGLE_PLACES;
     if network.max_clients < needed {
-        root.complain(
-            at,
-            format!(
-                "`max_clients` is {}, but device, tracker, an operator and {nodes} render nodes have places of their own; write {needed} or more, and one for each observer",
-                network.max_clients
-            ),
+        let text = format!(
+            "`max_clients` is {}, but device, tracker, an operator and {nodes} render nodes have places of their own; write {needed} or more, and one for each observer",
+            network.max_clients
         );
+        root.complain_of("network", text);
     }
     if nodes > MAX_MEMBERS && frames.swap != FrameSwap::Off {
-        let at = root.at_key("node");
-        root.complain(
-            at,
-            format!(
-                "there are {nodes} render nodes, but the frames of at most {MAX_MEMBERS} are kept together; leave some out, or write swap = \"off\" in [frames]"
-            ),
+        let text = format!(
+            "there are {nodes} render nodes, but the frames of at most {MAX_MEMBERS} are kept together; leave some out, or write swap = \"off\" in [frames]"
         );
+        root.complain_of("node", text);
     }
 }
 
 /// The network of a workbench that says nothing of it: within one machine.
-fn plain_network() -> Network {
+pub(super) fn plain_network() -> Network {
     Network {
         bind: IpAddr::V4(Ipv4Addr::LOCALHOST),
         quic_port: 4857,
@@ -142,50 +126,29 @@ fn plain_network() -> Network {
     }
 }
 
-/// Ports of QUIC and of UDP, which are not the same.
-fn ports(section: &Section<'_>, plain: &Network) -> (u16, u16) {
-    let quic_port = port(section, "quic_port", plain.quic_port);
-    let udp_port = port(section, "udp_port", plain.udp_port);
-    if quic_port == udp_port && quic_port != 0 {
-        let at = section.get("udp_port");
-        section.complain(
-            at.map_or(section.at(), |node| &node.at),
-            format!(
-                "`quic_port` and `udp_port` in {} are both {udp_port}; choose another for one",
-                section.name()
-            ),
-        );
-    }
-    (quic_port, udp_port)
-}
-
-pub(super) fn network(
-    section: Option<Section<'_>>,
-    root: &Section<'_>,
-    files: &Files<'_>,
-) -> Option<Network> {
+pub(super) fn network(section: &Section<'_>, files: &Files<'_>) -> Network {
     let plain = plain_network();
-    let Some(section) = section else {
-        return (!root.has("network")).then_some(plain);
-    };
     let transports = [
         ("udp", TransportKind::Udp),
         ("quic", TransportKind::QuicDatagram),
         ("multicast", TransportKind::Multicast),
     ];
-    let bind = bind(&section, plain.bind).unwrap_or(plain.bind);
-    let (quic_port, udp_port) = ports(&section, &plain);
+    let bind = bind(section, plain.bind);
+    let [quic_port, udp_port] = ports(
+        section,
+        [("quic_port", plain.quic_port), ("udp_port", plain.udp_port)],
+    );
     let transport = section.choice("transport", &transports).unwrap_or_default();
-    let (multicast_group, multicast_interface) = multicast(&section, transport, bind);
-    let network = Network {
+    let (multicast_group, multicast_interface) = multicast(section, transport, bind);
+    Network {
         bind,
         quic_port,
         udp_port,
         transport,
         multicast_group,
         multicast_interface,
-        key_file: files.path(&section, "key_file"),
-        also_key: also_key(&section, files),
+        key_file: files.path(section, "key_file"),
+        also_key: also_key(section, files),
         broadcast_rate: section.number_or(
             "broadcast_rate",
             Range::Between(MIN_STATES, MAX_RATE),
@@ -193,14 +156,12 @@ pub(super) fn network(
         ),
         max_clients: section
             .integer("max_clients", 1, MAX_CLIENTS)
-            .map_or(plain.max_clients, |n| n as usize),
-        admission: admission(&section),
+            .unwrap_or(plain.max_clients),
+        admission: admission(section),
         node_timeout: section.number_or(
             "node_timeout",
             Range::Between(MIN_NODE_TIMEOUT, MAX_NODE_TIMEOUT),
             NODE_TIMEOUT,
         ),
-    };
-    section.finish();
-    Some(network)
+    }
 }

@@ -70,10 +70,8 @@ fn scenes(section: &Section<'_>, files: &Files<'_>) -> Vec<String> {
         .take(MAX_SCENES)
         .map(|(name, at)| {
             if name.is_empty() {
-                section.complain(
-                    at,
-                    "a scene in [operator] has no name; write a shipped one's, or a file",
-                );
+                let text = "a scene in [operator] has no name; write a shipped one's, or a file";
+                section.complain(at, text);
             }
             files.scene(name)
         })

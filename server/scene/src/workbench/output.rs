@@ -1,14 +1,14 @@
 //! How the picture of a screen is corrected for its projector: keys of `[[screen]]`, and the files that they name.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
 use taut_screens::{Fault, OutputMesh, file_name_fault, read_blend, read_surface, read_warp};
 
 use super::load::Workbench;
-use super::parts::table;
 use super::spec::{Node, Screen, Stereo, Window};
-use crate::document::{Range, Section, Value};
+use crate::document::{Range, Section, Value, table};
 use crate::problem::Problem;
 
 /// Endings of a warp: a float map, or Paul Bourke's mesh.
@@ -65,10 +65,7 @@ impl ScreenOutput {
     /// Every file, each once.
     pub fn files(&self) -> Vec<&str> {
         let all = self.warp.iter().chain(&self.surface).chain(&self.blend);
-        let mut names: Vec<&str> = all.map(String::as_str).collect();
-        names.sort_unstable();
-        names.dedup();
-        names
+        each_once(all.map(String::as_str))
     }
 
     fn corrects_colour(&self) -> bool {
@@ -76,14 +73,17 @@ impl ScreenOutput {
     }
 }
 
+fn each_once<'n>(names: impl Iterator<Item = &'n str>) -> Vec<&'n str> {
+    BTreeSet::from_iter(names).into_iter().collect()
+}
+
 /// Reads the keys of a `[[screen]]`.
 pub(super) fn output(screen: &Section<'_>) -> ScreenOutput {
     let warp = files(screen, "warp", &WARP);
     let surface = files(screen, "surface", &SURFACE);
-    if let (false, false, Some(node)) = (warp.is_empty(), surface.is_empty(), screen.get("surface"))
-    {
+    if !warp.is_empty() && !surface.is_empty() {
         let text = "`warp` and `surface` of a [[screen]] exclude each other: a warp is of a flat screen, a surface is where the light falls; leave one out";
-        screen.complain(&node.at, text);
+        screen.complain_of("surface", text);
     }
     let blend = files(screen, "blend", &BLEND);
     let blend_gamma = screen.number_or("blend_gamma", MASK_EXPONENT, 1.0);
@@ -114,10 +114,8 @@ fn files(screen: &Section<'_>, key: &'static str, endings: &[&str]) -> Vec<Strin
     let mut names = Vec::new();
     for item in items {
         let Value::Text(name) = &item.value else {
-            screen.complain(
-                &item.at,
-                format!("`{key}` of a [[screen]] must be {WANTED}"),
-            );
+            let text = format!("`{key}` of a [[screen]] must be {WANTED}");
+            screen.complain(&item.at, text);
             return Vec::new();
         };
         if let Some(fault) = file_name_fault(name, endings) {
@@ -177,10 +175,7 @@ impl Workbench {
     pub fn screen_files(&self, node: &Node) -> Vec<&str> {
         let screens = self.screens.iter();
         let drawn = screens.filter(|screen| node.screens.contains(&screen.name));
-        let mut names: Vec<&str> = drawn.flat_map(|screen| screen.output.files()).collect();
-        names.sort_unstable();
-        names.dedup();
-        names
+        each_once(drawn.flat_map(|screen| screen.output.files()))
     }
 
     /// Everything that is wrong with the files of the screens, for the nodes that draw them.
@@ -272,8 +267,9 @@ impl Workbench {
 }
 
 fn problem(fault: Fault) -> Problem {
-    match fault.line {
-        Some(line) => Problem::at_line(fault.file, line, fault.text),
-        None => Problem::of_file(fault.file, fault.text),
+    Problem {
+        file: fault.file,
+        line: fault.line,
+        text: fault.text,
     }
 }

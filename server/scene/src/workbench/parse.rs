@@ -14,14 +14,14 @@ use super::log::log;
 use super::looking_on::{observers, vrpn, zenoh};
 use super::machines::{Named, machines};
 use super::monitoring::monitoring;
-use super::network::{network, places};
+use super::network::{network, places, plain_network};
 use super::operator::operator;
-use super::parts::{Files, table};
+use super::parts::Files;
 use super::realtime::realtime;
 use super::safety::safety;
 use super::viewer::{show, viewer};
 use super::wrench_in::wrench_in;
-use crate::document::{Document, Section};
+use crate::document::{Document, Section, table};
 use crate::problem::FileError;
 use crate::scene::pose_of;
 
@@ -51,7 +51,8 @@ fn workbench(root: &Section<'_>, files: &Files<'_>) -> Option<Workbench> {
     let viewer = viewer(root, files);
     let device = device(root, files);
     let dynamics = table(root, "dynamics", dynamics).flatten();
-    let mut network = network(root.section("network"), root, files);
+    let mut network = table(root, "network", |s| network(s, files))
+        .or_else(|| (!root.has("network")).then(plain_network));
     let frames = table(root, "frames", frames).unwrap_or_default();
     if let Some(network) = &network {
         places(root, network, nodes.len(), &frames);
@@ -63,8 +64,8 @@ fn workbench(root: &Section<'_>, files: &Files<'_>) -> Option<Workbench> {
         tracking: viewer.as_ref().map(|viewer| &viewer.tracking),
     };
     let machines = machines(root, &named);
-    let monitoring = monitoring(root.section("monitoring"), root, files);
-    let realtime = realtime(root.section("realtime"));
+    let monitoring = table(root, "monitoring", |s| monitoring(s, files)).unwrap_or_default();
+    let realtime = table(root, "realtime", realtime).unwrap_or_default();
     let safety = table(root, "safety", safety).unwrap_or_default();
     let log = table(root, "log", log).unwrap_or_default();
     let show = table(root, "show", show).unwrap_or_default();
@@ -86,8 +87,8 @@ fn workbench(root: &Section<'_>, files: &Files<'_>) -> Option<Workbench> {
         dynamics,
         network: network?,
         frames,
-        monitoring: monitoring?,
-        realtime: realtime?,
+        monitoring,
+        realtime,
         safety,
         log,
         show,

@@ -42,40 +42,34 @@ impl Files<'_> {
     }
 }
 
-/// Reads a table and complains of the keys that were not asked for.
-pub(super) fn table<T>(
-    parent: &Section<'_>,
-    key: &'static str,
-    read: impl FnOnce(&Section<'_>) -> T,
-) -> Option<T> {
-    let section = parent.section(key)?;
-    let value = read(&section);
-    section.finish();
-    Some(value)
+/// An address to listen on.
+pub(super) fn bind(section: &Section<'_>, default: IpAddr) -> IpAddr {
+    let Some(text) = section.text("bind") else {
+        return default;
+    };
+    text.parse().unwrap_or_else(|_| {
+        let what = "which is no address; write one such as \"0.0.0.0\"";
+        section.fault("bind", format_args!("is \"{text}\", {what}"));
+        default
+    })
 }
 
-/// An address to listen on.
-pub(super) fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
-    let Some(text) = section.text("bind") else {
-        return (!section.has("bind")).then_some(default);
-    };
-    let address = text.parse();
-    if address.is_err() {
-        let at = section.at_key("bind");
-        section.complain(
-            at,
-            format!(
-                "`bind` in {} is \"{text}\", which is no address; write one such as \"0.0.0.0\"",
-                section.name()
-            ),
+/// Two ports that are not the same, unless both are free ones.
+pub(super) fn ports(section: &Section<'_>, keys: [(&'static str, u16); 2]) -> [u16; 2] {
+    let ports = keys.map(|(key, default)| port(section, key, default));
+    if ports[0] == ports[1] && ports[0] != 0 {
+        let [(first, _), (second, _)] = keys;
+        let text = format!(
+            "`{first}` and `{second}` in {} are both {}; choose another for one",
+            section.name(),
+            ports[0]
         );
+        section.complain_of(second, text);
     }
-    address.ok()
+    ports
 }
 
 pub(super) fn port(section: &Section<'_>, key: &'static str, default: u16) -> u16 {
-    section
-        .integer(key, 0, i64::from(u16::MAX))
-        .and_then(|n| u16::try_from(n).ok())
-        .unwrap_or(default)
+    let port = section.integer(key, 0, i64::from(u16::MAX));
+    port.unwrap_or(default)
 }

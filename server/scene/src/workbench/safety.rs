@@ -21,11 +21,7 @@ const LAST_BUTTON: i64 = 15;
 pub(super) fn safety(section: &Section<'_>) -> Safety {
     let default = Safety::default();
     let up_to = Range::PositiveUpTo;
-    let button = |key| {
-        section
-            .integer(key, 0, LAST_BUTTON)
-            .and_then(|number| u8::try_from(number).ok())
-    };
+    let button = |key| section.integer(key, 0, LAST_BUTTON);
     let rearms = [("automatic", Rearm::Automatic), ("manual", Rearm::Manual)];
     let passivities = [
         ("observe", Passivity::Observe),
@@ -74,12 +70,10 @@ fn fades(
 ) {
     let reach = slew * Safety::FADE_MS;
     if let Some(limit) = limit.filter(|limit| *limit > reach) {
-        let at = section.at_key(limit_key);
-        section.complain(
-            at,
-            format!(
-                "`{limit_key}` in {} is {limit} {unit}, which cannot fade in {} ms at `{slew_key}` = {slew} {unit}/ms; use at most {reach} {unit}, or a larger `{slew_key}`",
-                section.name(),
+        section.fault(
+            limit_key,
+            format_args!(
+                "is {limit} {unit}, which cannot fade in {} ms at `{slew_key}` = {slew} {unit}/ms; use at most {reach} {unit}, or a larger `{slew_key}`",
                 Safety::FADE_MS,
             ),
         );

@@ -205,6 +205,19 @@ pub struct Monitoring {
     pub memory_limit: u64,
 }
 
+impl Default for Monitoring {
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            bind: IpAddr::V4(Ipv4Addr::LOCALHOST),
+            grpc_port: 9876,
+            web_port: 9090,
+            record: None,
+            memory_limit: 256 << 20,
+        }
+    }
+}
+
 /// What to do where the system refuses real-time scheduling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RealTimeMode {
@@ -234,6 +247,21 @@ pub struct RealTime {
     pub god_object_core: Option<usize>,
     /// Most god-object updates per second; `None` is as many as there can be.
     pub god_object_rate: Option<f64>,
+}
+
+impl Default for RealTime {
+    fn default() -> Self {
+        Self {
+            mode: RealTimeMode::Waive,
+            haptics_priority: 80,
+            coupling_priority: 70,
+            god_object_priority: None,
+            haptics_core: None,
+            coupling_core: None,
+            god_object_core: None,
+            god_object_rate: None,
+        }
+    }
 }
 
 /// Who arms the force at the start and after a fault.

@@ -1,11 +1,11 @@
 //! Who looks: eyes, head, its tracking, comfort; and what is drawn beside the scene.
 
 use super::device::keys_of;
-use super::parts::{Files, table};
+use super::parts::Files;
 use super::spec::{HeadTracking, Show, Viewer};
 use taut_kinds::{KINDS, KindId};
 
-use crate::document::{Range, Section};
+use crate::document::{Range, Section, table};
 use crate::scene::pose_of;
 
 /// Largest limit on what stands out from a screen, degrees: nobody fuses more.
@@ -13,22 +13,17 @@ const MAX_DISPARITY_DEG: f64 = 30.0;
 
 /// Reads `[viewer]`, which must be there.
 pub(super) fn viewer(root: &Section<'_>, files: &Files<'_>) -> Option<Viewer> {
-    let viewer = table(root, "viewer", |section| viewer_of(section, files));
-    if viewer.is_none() && !root.has("viewer") {
-        root.complain_missing("viewer", "the table [viewer] with head");
-    }
-    viewer.flatten()
+    root.require("viewer", "the table [viewer] with head");
+    table(root, "viewer", |section| viewer_of(section, files)).flatten()
 }
 
 fn viewer_of(section: &Section<'_>, files: &Files<'_>) -> Option<Viewer> {
     let eye_separation = section.number_or("eye_separation", Range::UpTo(0.2), 0.064);
     let head = table(section, "head", pose_of);
-    if head.is_none() && !section.has("head") {
-        section.complain_missing(
-            "head",
-            "head = { position = [0.0, -1.3, 0.9], rotation = [0.7071, 0.7071, 0.0, 0.0] }",
-        );
-    }
+    section.require(
+        "head",
+        "head = { position = [0.0, -1.3, 0.9], rotation = [0.7071, 0.7071, 0.0, 0.0] }",
+    );
     let sway = table(section, "sway", |sway| HeadTracking::Sway {
         amplitude: sway.number_or("amplitude", Range::UpTo(1.0), 0.05),
         period: sway.number_or("period", Range::Positive, 6.0),
@@ -40,29 +35,22 @@ fn viewer_of(section: &Section<'_>, files: &Files<'_>) -> Option<Viewer> {
         .number_or("nearest_disparity_deg", Range::UpTo(MAX_DISPARITY_DEG), 0.0)
         .to_radians();
     if near >= far {
-        section.complain(
-            section.at(),
-            format!(
-                "`near` ({near}) in {} must be smaller than `far` ({far})",
-                section.name()
-            ),
-        );
+        let text = format!("`near` ({near}) in [viewer] must be smaller than `far` ({far})");
+        section.complain(section.at(), text);
     }
     let vrpn = KINDS.iter().find(|kind| kind.id == KindId::Vrpn)?;
     // A head is where it is.
     let tracker = table(section, "tracker", |tracker| {
         keys_of(vrpn, tracker, files, &["anchor"])
     });
-    if let (Some(_), Some(_), Some(node)) = (&sway, &tracker, section.get("tracker")) {
+    if sway.is_some() && tracker.is_some() {
         let text = "`tracker` and `sway` in [viewer] exclude each other; leave one out";
-        section.complain(&node.at, text);
+        section.complain_of("tracker", text);
     }
     let remote = section.boolean("remote_tracker").unwrap_or(false);
-    if let (true, Some(node)) = (remote, section.get("remote_tracker"))
-        && (tracker.is_some() || sway.is_some())
-    {
-        let text = "`remote_tracker` in [viewer] excludes `tracker` and `sway`; leave one out";
-        section.complain(&node.at, text);
+    if remote && (tracker.is_some() || sway.is_some()) {
+        let what = "excludes `tracker` and `sway`; leave one out";
+        section.fault("remote_tracker", what);
     }
     let tracking = match tracker {
         None if remote => HeadTracking::Remote,

@@ -130,9 +130,8 @@ fn wrench_in_of(section: &Section<'_>) -> WrenchIn {
         }
     } else {
         for key in ["topic", "allow_unproven"] {
-            if let Some(node) = section.get(key) {
-                let text = format!("`{key}` in [wrench_in] is for source = \"ros\"; leave it out");
-                section.complain(&node.at, text);
+            if section.has(key) {
+                section.fault(key, "is for source = \"ros\"; leave it out");
             }
         }
         WrenchSource::Taut
@@ -151,11 +150,9 @@ fn wrench_in_of(section: &Section<'_>) -> WrenchIn {
 fn age(section: &Section<'_>) -> Option<f64> {
     let age = section.number("max_age_ms", Range::PositiveUpTo(LONGEST_AGE_MS))?;
     if age < SHORTEST_AGE_MS {
-        let at = section.at_key("max_age_ms");
-        let text = format!(
-            "`max_age_ms` in [wrench_in] is {age}, which leaves no time to fade; write {SHORTEST_AGE_MS} to {LONGEST_AGE_MS}"
-        );
-        section.complain(at, text);
+        let wanted = format_args!("{SHORTEST_AGE_MS} to {LONGEST_AGE_MS}");
+        let what = format!("is {age}, which leaves no time to fade; write {wanted}");
+        section.fault("max_age_ms", what);
         return None;
     }
     Some(age)
@@ -165,11 +162,9 @@ fn ros_topic(section: &Section<'_>, topic: Option<&str>) -> Option<String> {
     match topic {
         Some(text) if is_topic(text) => Some(text.to_owned()),
         Some(text) => {
-            let at = section.at_key("topic");
-            section.complain(
-                at,
-                format!("`topic` in [wrench_in] is \"{text}\", which is no absolute name of ROS 2; write one such as \"/ft_sensor/wrench\""),
-            );
+            let what =
+                "which is no absolute name of ROS 2; write one such as \"/ft_sensor/wrench\"";
+            section.fault("topic", format_args!("is \"{text}\", {what}"));
             None
         }
         None => {
@@ -181,23 +176,19 @@ fn ros_topic(section: &Section<'_>, topic: Option<&str>) -> Option<String> {
 
 /// Complains of what does not go with it.
 fn complain_beside(section: &Section<'_>, wanted: &WrenchIn, (device, safety, zenoh): Beside<'_>) {
-    let complain = |key: &'static str, text: String| {
-        let at = section.at_key(key);
-        section.complain(at, text);
-    };
     // A bridge keeps the energy itself, or feels nothing of it.
     if device != Some(&Device::Remote) && safety.passivity != Passivity::Control {
-        complain(
+        section.complain_of(
             "enabled",
-            "[wrench_in] needs passivity = \"control\" in [safety]: who sends a force could give the hand energy without end otherwise".to_owned(),
+            "[wrench_in] needs passivity = \"control\" in [safety]: who sends a force could give the hand energy without end otherwise",
         );
     }
     if let WrenchSource::Ros { .. } = &wanted.source
         && !zenoh.enabled
     {
-        complain(
+        section.complain_of(
             "source",
-            "source = \"ros\" in [wrench_in] comes through the routers of [zenoh], which is off; set enabled = true there".to_owned(),
+            "source = \"ros\" in [wrench_in] comes through the routers of [zenoh], which is off; set enabled = true there",
         );
     }
     let fade = wanted.fade_ms();
@@ -206,13 +197,11 @@ fn complain_beside(section: &Section<'_>, wanted: &WrenchIn, (device, safety, ze
         ("max_torque", wanted.max_torque, safety.torque_slew, "N m"),
     ] {
         if limit > slew * fade {
-            complain(
-                key,
-                format!(
-                    "`{key}` in [wrench_in] is {limit} {unit}, which cannot fade in {fade:.0} ms at {slew} {unit}/ms of [safety]; use at most {:.2}, or a longer `max_age_ms`",
-                    slew * fade
-                ),
+            let most = slew * fade;
+            let what = format!(
+                "is {limit} {unit}, which cannot fade in {fade:.0} ms at {slew} {unit}/ms of [safety]; use at most {most:.2}, or a longer `max_age_ms`"
             );
+            section.fault(key, what);
         }
     }
 }
