@@ -67,6 +67,16 @@ impl FileError {
         Self { problems }
     }
 
+    /// The value, or nothing where its faults go to `problems`.
+    pub(crate) fn noted<T, E: Into<Self>>(
+        found: Result<T, E>,
+        problems: &mut Vec<Problem>,
+    ) -> Option<T> {
+        found
+            .map_err(|error| problems.extend(error.into().problems))
+            .ok()
+    }
+
     /// Every fault, the first one first.
     pub fn problems(&self) -> &[Problem] {
         &self.problems

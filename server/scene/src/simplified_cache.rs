@@ -10,7 +10,7 @@ use std::time::{Duration, SystemTime};
 use god_object::Mesh;
 use taut_cache::{Cached, FileCache};
 
-use crate::mesh_file::{read_mesh_bytes, write_ply};
+use crate::mesh_file::{RawMesh, read_mesh_bytes, write_ply};
 use crate::simplify::Simplified;
 
 /// Name of the directory below the user's cache of the program.
@@ -130,10 +130,7 @@ fn encode(key: Key, mesh: &Mesh, report: &Simplified) -> Vec<u8> {
     content.extend((reason.len() as u32).to_le_bytes());
     content.extend(reason.as_bytes());
     if report.unchanged.is_none() {
-        content.extend(write_ply(&crate::mesh_file::RawMesh {
-            vertices: mesh.vertices().to_vec(),
-            triangles: mesh.triangles().to_vec(),
-        }));
+        content.extend(write_ply(&RawMesh::from(mesh)));
     }
     [seal(key, &content).as_bytes(), &content[..]].concat()
 }

@@ -93,47 +93,39 @@ fn compute(original: Mesh, max_error: f64, body: &str) -> (Mesh, Simplified) {
         before,
         format_args!("{body}: simplifying {before} triangles"),
     );
+    let report = |after: usize, [to_original, from_original]: [f64; 2], unchanged| Simplified {
+        body: body.to_owned(),
+        triangles_before: before,
+        triangles_after: after,
+        max_error,
+        to_original,
+        from_original,
+        unchanged,
+    };
     let mut reason = "no candidate has fewer triangles".to_owned();
     for (tried, level) in LEVELS.into_iter().enumerate() {
         progress.attempt(tried + 1, LEVELS.len());
-        let raw = candidate(&original, max_error as f32 * level);
+        let raw = reduced(
+            original.vertices(),
+            original.triangles(),
+            max_error as f32 * level,
+        );
         if raw.triangles.len() >= before {
             break; // finer levels have no fewer
         }
         match measured(raw, &original, max_error, &progress) {
-            Ok((mesh, [to_original, from_original])) => {
-                let report = Simplified {
-                    body: body.to_owned(),
-                    triangles_before: before,
-                    triangles_after: mesh.triangles().len(),
-                    max_error,
-                    to_original,
-                    from_original,
-                    unchanged: None,
-                };
+            Ok((mesh, distances)) => {
+                let report = report(mesh.triangles().len(), distances, None);
                 return (mesh, report);
             }
             Err(why) => reason = why,
         }
     }
-    let report = Simplified {
-        body: body.to_owned(),
-        triangles_before: before,
-        triangles_after: before,
-        max_error,
-        to_original: 0.0,
-        from_original: 0.0,
-        unchanged: Some(reason),
-    };
+    let report = report(before, [0.0; 2], Some(reason));
     (original, report)
 }
 
-/// The simplifier's answer for an estimated error, m. Its vertices are vertices of the original, to the last digit.
-fn candidate(original: &Mesh, error: f32) -> RawMesh {
-    reduced(original.vertices(), original.triangles(), error)
-}
-
-/// A surface with fewer triangles, by the simplifier's estimate off by at most this error, m: for what is only seen.
+/// A surface with fewer triangles, by the simplifier's estimate off by at most this error, m. Its vertices are vertices of the original, to the last digit.
 pub(crate) fn reduced(vertices: &[Point3<f64>], triangles: &[[u32; 3]], error: f32) -> RawMesh {
     let first = vertices.first().copied().unwrap_or_else(Point3::origin);
     let around =
@@ -155,21 +147,12 @@ pub(crate) fn reduced(vertices: &[Point3<f64>], triangles: &[[u32; 3]], error: f
             break;
         }
     }
-    let mut place = vec![u32::MAX; vertices.len()];
-    let mut raw = RawMesh::default();
-    for corners in kept.chunks_exact(3) {
-        let mut triangle = [0; 3];
-        for (corner, v) in triangle.iter_mut().zip(corners) {
-            let at = &mut place[*v as usize];
-            if *at == u32::MAX {
-                *at = raw.vertices.len() as u32;
-                raw.vertices.push(vertices[*v as usize]);
-            }
-            *corner = *at;
-        }
-        raw.triangles.push(triangle);
-    }
-    raw
+    let kept = RawMesh {
+        vertices: vertices.to_vec(),
+        triangles: kept.as_chunks().0.to_vec(),
+    };
+    let all: Vec<u32> = (0..kept.triangles.len() as u32).collect();
+    kept.some(&all)
 }
 
 /// The candidate as a mesh, and its distances to and from the original, m; or why it is not taken.

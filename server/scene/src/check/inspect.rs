@@ -141,10 +141,7 @@ fn check_toml(path: &Path) -> FileReport {
         Ok(document) => document,
         Err(error) => return Found::fault(error).of(path, FileKind::Unknown),
     };
-    let has = |keys: &[&str]| match &document.root.value {
-        Value::Table(entries) => entries.iter().any(|(key, _)| keys.contains(&key.as_str())),
-        _ => false,
-    };
+    let has = |keys: &[&str]| keys.iter().any(|key| document.root.child(key).is_some());
     let mut found = Found::default();
     if has(&["god_object", "obstacle", "coupling", "limits", "hand"]) {
         match Scene::load(path) {
@@ -195,10 +192,8 @@ fn add_workbench(path: &Path, document: &Document, found: &mut Found) {
     found.notes = workbench.notes();
     found.problems = workbench.screen_faults();
     for other in workbench.scenes() {
-        if other != workbench.scene
-            && let Err(error) = Scene::named_or_file(other)
-        {
-            found.problems.extend(error.into_problems());
+        if other != workbench.scene {
+            FileError::noted(Scene::named_or_file(other), &mut found.problems);
         }
     }
     add_scene(workbench.load_scene(), found);
@@ -214,9 +209,8 @@ fn add_workbench(path: &Path, document: &Document, found: &mut Found) {
 /// Builds a scene and adds what is found.
 fn add_scene(scene: Result<Scene, FileError>, found: &mut Found) {
     let built = scene.and_then(|scene| scene.build().map(|built| (scene, built)));
-    let (scene, built) = match built {
-        Ok(both) => both,
-        Err(error) => return found.problems.extend(error.into_problems()),
+    let Some((scene, built)) = FileError::noted(built, &mut found.problems) else {
+        return;
     };
     let bodies = look_at(&scene, &built);
     found.problems.extend(bodies.problems);

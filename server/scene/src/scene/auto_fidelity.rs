@@ -56,12 +56,13 @@ impl Scene {
         let spec = self.spec.fidelity?;
         let need = self.need(&spec, body, obstacles, settings, hand, motions);
         let method = &self.spec.method;
-        let shapes = self.shapes();
+        let obstacles = self.spec.obstacles.iter().map(|o| &o.shape);
+        let shapes = std::iter::once(&self.spec.god_object.shape).chain(obstacles);
         let fixed = Fixed {
             rate: spec.update_rate,
             gap_tolerance: method.gap_tolerance,
             rounds: method.implicit_rounds,
-            mesh_errors: shapes.iter().map(|shape| simplify_of(shape)).collect(),
+            mesh_errors: shapes.map(Shape::simplify).collect(),
         };
         let chosen = decide(&need, &fixed, spec.budget_j, spec.time_us);
         let mut choices = method_choices(&need, &chosen, &fixed);
@@ -129,13 +130,6 @@ impl Scene {
             shading.push(wanted);
         }
         shading
-    }
-
-    fn shapes(&self) -> Vec<&Shape> {
-        let obstacles = self.spec.obstacles.iter().map(|o| &o.shape);
-        std::iter::once(&self.spec.god_object.shape)
-            .chain(obstacles)
-            .collect()
     }
 
     fn need(
@@ -206,13 +200,6 @@ impl Scene {
             force,
             widest_tolerance: widest_tolerance(settings),
         }
-    }
-}
-
-fn simplify_of(shape: &Shape) -> Option<f64> {
-    match shape {
-        Shape::Mesh { simplify, .. } => *simplify,
-        _ => None,
     }
 }
 

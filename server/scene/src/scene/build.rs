@@ -66,7 +66,7 @@ impl Scene {
             carried: scenery.carried,
             lost_looks: scenery.lost.into_iter().collect(),
             simplified,
-            sources: Sources::new(pieces.sources),
+            sources: Sources(pieces.sources),
             view: spec.view,
             environment: pieces.environment,
             size,

@@ -10,7 +10,7 @@ use super::opacities::by_opacity;
 use super::spec::{Carrier, Shape, VisualSpec};
 use crate::appearance::Appearance;
 use crate::mesh_file::{FileLook, RawMesh};
-use crate::problem::Problem;
+use crate::problem::{FileError, Problem};
 
 /// What is only seen: the scene's own, in its order, and then parts of bodies that are drawn beside them.
 #[derive(Debug, Default)]
@@ -72,10 +72,9 @@ impl Scene {
         let obstacles = self.spec.obstacles.iter().map(|o| &o.visual);
         let all = std::iter::once(&self.spec.god_object.visual).chain(obstacles);
         let mut read = |visual: Option<&'s VisualSpec>| {
-            let visual = visual?;
-            let read = self.raw_mesh(&visual.shape, &visual.at);
-            let read = read.map_err(|error| problems.extend(error.into_problems()));
-            read.ok().map(|(mesh, look)| (&visual.shape, mesh, look))
+            let VisualSpec { shape, at } = visual?;
+            let read = FileError::noted(self.raw_mesh(shape, at), problems);
+            read.map(|(mesh, look)| (shape, mesh, look))
         };
         all.map(|visual| read(visual.as_ref())).collect()
     }
@@ -84,12 +83,9 @@ impl Scene {
     pub(super) fn built_scenery(&self, problems: &mut Vec<Problem>) -> SceneryList {
         let (mut scenery, mut others) = (SceneryList::default(), Vec::new());
         for spec in &self.spec.scenery {
-            let (mesh, look) = match self.raw_mesh(&spec.shape, &spec.shape_at) {
-                Ok(read) => read,
-                Err(error) => {
-                    problems.extend(error.into_problems());
-                    continue;
-                }
+            let read = self.raw_mesh(&spec.shape, &spec.shape_at);
+            let Some((mesh, look)) = FileError::noted(read, problems) else {
+                continue;
             };
             let carrier = spec.carrier.map(|by| (by, spec.pose));
             let pose = match carrier {
@@ -98,10 +94,9 @@ impl Scene {
             };
             let named = (spec.name.as_str(), pose, &spec.appearance);
             let mut parts = drawn(named, (&spec.shape, mesh, look), &mut scenery.lost).into_iter();
-            parts
-                .next()
-                .into_iter()
-                .for_each(|part| scenery.add(part, carrier));
+            if let Some(part) = parts.next() {
+                scenery.add(part, carrier);
+            }
             others.extend(parts.map(|part| (part, carrier)));
         }
         others

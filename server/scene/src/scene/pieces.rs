@@ -59,14 +59,8 @@ impl Scene {
             .collect();
         let scenery = self.built_scenery(&mut problems);
         let visuals = self.visuals(&mut problems);
-        let environment = self.environment().unwrap_or_else(|problem| {
-            problems.push(problem);
-            None
-        });
-        let hand_path = self.hand_path().unwrap_or_else(|error| {
-            problems.extend(error.into_problems());
-            None
-        });
+        let environment = FileError::noted(self.environment(), &mut problems).flatten();
+        let hand_path = FileError::noted(self.hand_path(), &mut problems).flatten();
         let motions = self.motions(&mut problems);
         let textures = self.textures(&obstacles, &mut problems);
         FileError::unless_empty(problems)?;
@@ -97,9 +91,7 @@ impl Scene {
                 problems.extend(self.height_map_file(map).err());
                 return None;
             };
-            self.height_map(map, &o.shape, mesh)
-                .map_err(|error| problems.extend(error.into_problems()))
-                .ok()
+            FileError::noted(self.height_map(map, &o.shape, mesh), problems)
         };
         self.spec.obstacles.iter().zip(meshes).map(of_one).collect()
     }
@@ -108,18 +100,16 @@ impl Scene {
     fn motions(&self, problems: &mut Vec<Problem>) -> Vec<BuiltMotion> {
         let obstacles = self.spec.obstacles.iter().enumerate();
         let moving = obstacles.filter_map(|(index, o)| Some((index, o.motion.as_ref()?)));
-        let mut motions = Vec::new();
-        for (obstacle, motion) in moving {
-            match self.trace(&motion.trace, &motion.at) {
-                Ok(path) => motions.push(BuiltMotion {
-                    obstacle,
-                    path,
-                    repeat: motion.repeat,
-                }),
-                Err(error) => problems.extend(error.into_problems()),
-            }
-        }
-        motions
+        let built = moving.filter_map(|(obstacle, motion)| {
+            let path = FileError::noted(self.trace(&motion.trace, &motion.at), problems)?;
+            let repeat = motion.repeat;
+            Some(BuiltMotion {
+                obstacle,
+                path,
+                repeat,
+            })
+        });
+        built.collect()
     }
 
     fn mesh(
@@ -129,12 +119,8 @@ impl Scene {
         before: Option<&Prepared>,
         problems: &mut Vec<Problem>,
     ) -> (Option<Mesh>, FileLook, Source) {
-        let (raw, look) = match self.raw_mesh(shape, at) {
-            Ok(read) => read,
-            Err(error) => {
-                problems.extend(error.into_problems());
-                return (None, FileLook::default(), Source::none());
-            }
+        let Some((raw, look)) = FileError::noted(self.raw_mesh(shape, at), problems) else {
+            return (None, FileLook::default(), Source::default());
         };
         let mut source = Source::of(&raw, shape.simplify());
         if let Some(mesh) = before.and_then(|before| before.take_over(&mut source)) {

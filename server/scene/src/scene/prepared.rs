@@ -18,11 +18,12 @@ pub struct Prepared {
 
 /// What the meshes of a built scene were made of.
 #[derive(Clone, Debug, Default)]
-pub struct Sources(Vec<Source>);
+pub struct Sources(pub(super) Vec<Source>);
 
 /// What one mesh was made of.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Source {
+    /// `None` of no mesh.
     digest: Option<blake3::Hash>,
     /// How it was simplified since.
     pub(super) simplified: Option<Simplified>,
@@ -44,20 +45,6 @@ impl Source {
             digest: Some(hash.finalize()),
             simplified: None,
         }
-    }
-
-    /// Of no mesh.
-    pub(super) fn none() -> Self {
-        Self {
-            digest: None,
-            simplified: None,
-        }
-    }
-}
-
-impl Sources {
-    pub(super) fn new(sources: Vec<Source>) -> Self {
-        Self(sources)
     }
 }
 
