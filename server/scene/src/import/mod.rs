@@ -117,10 +117,7 @@ fn read_bodies(request: &ImportRequest) -> Result<Vec<Body>, FileError> {
             let name = if held { GOD_OBJECT_NAME } else { &own };
             let made =
                 sources.and_then(|sources| body(name, &format!("{own}.ply"), sources, request));
-            match made {
-                Ok(body) => bodies.push(body),
-                Err(error) => problems.extend(error.into_problems()),
-            }
+            bodies.extend(FileError::noted(made, &mut problems));
         }
     }
     if problems.is_empty() {
@@ -159,10 +156,8 @@ fn sources_of<'r>(
     }
     let (mut sources, mut problems) = (Vec::new(), Vec::new());
     for part in files {
-        match read(part).and_then(|read| read.joined(part, request)) {
-            Ok(source) => sources.push(source),
-            Err(error) => problems.extend(error.into_problems()),
-        }
+        let source = read(part).and_then(|read| read.joined(part, request));
+        sources.extend(FileError::noted(source, &mut problems));
     }
     let stem = first.path.file_stem().unwrap_or_default().to_string_lossy();
     let called = first.body.clone().unwrap_or_else(|| stem.into_owned());

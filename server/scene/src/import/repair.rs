@@ -5,6 +5,7 @@ use nalgebra::Point3;
 use super::edges::components;
 use super::holes::{self, MAX_HOLE_EDGES};
 use super::report::{Finding, Places};
+use super::request::ImportRequest;
 use super::weld::{self, WIDEST_SHARE, Welded};
 use super::{faces, manifold, orientation, shell, stitch};
 use crate::check::place_text;
@@ -14,13 +15,6 @@ use crate::mesh_file::RawMesh;
 const MAX_LOOSE_PARTS: usize = 10_000;
 /// Rounding of a file may be at most this share of the part's diagonal; more, and its form is lost.
 const MOST_ROUNDING: f64 = 1e-3;
-
-/// What the user asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Wishes {
-    pub(super) close_holes: Option<usize>,
-    pub(super) thicken: Option<f64>,
-}
 
 /// A closed surface, and what was done; which side of its parts is outside is not yet known.
 #[derive(Debug)]
@@ -36,7 +30,7 @@ pub(super) struct Repaired {
 pub(super) fn repair(
     mut mesh: RawMesh,
     single: bool,
-    wishes: Wishes,
+    wishes: &ImportRequest,
 ) -> Result<Repaired, Vec<String>> {
     let rounding = weld::rounding(&mesh, single);
     let size = weld::diagonal(&mesh);
@@ -183,7 +177,7 @@ fn make_surfaces(
 /// Holes and sheets; how far thickening went, m.
 fn close(
     mesh: &mut RawMesh,
-    wishes: Wishes,
+    wishes: &ImportRequest,
     findings: &mut Vec<Finding>,
 ) -> Result<Option<f64>, Vec<String>> {
     // Small openings of a sheet are meant, as those for bolts: they stay, unless it is asked for.

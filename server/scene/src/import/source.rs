@@ -5,7 +5,7 @@ use std::path::Path;
 use super::UpAxis;
 use super::cloud::{ERROR_SHARE, MAX_SITES, Shell, shell};
 use super::edges::components;
-use super::repair::{Repaired, Wishes, is_single, repair};
+use super::repair::{Repaired, is_single, repair};
 use super::report::{Finding, Places, SourceReport};
 use super::request::{ImportPart, ImportRequest};
 use super::unit::{LengthUnit, unit_of};
@@ -62,18 +62,13 @@ impl Read {
         part: &ImportPart,
         request: &ImportRequest,
     ) -> Result<Source, FileError> {
-        let only = &request.only;
-        let pieces = std::mem::take(&mut self.file.pieces);
-        let (mesh, look) = if only.is_empty() || pieces.names().is_empty() {
-            self.file.take_whole()
-        } else {
-            let chosen = pieces.chosen(only);
-            let some = self.file.parts([&chosen[..]]).next();
-            some.filter(|_| !chosen.is_empty())
-                .ok_or_else(|| Problem::of_file(self.path.display(), pieces.no_such(&only[0])))?
-        };
-        let told = told_of_file(&pieces, only);
-        source((mesh, look), None, told, part, request)
+        let is_named = !self.file.pieces.names().is_empty();
+        let only = request.only.as_slice();
+        let what = self
+            .file
+            .take(&self.path, if is_named { only } else { &[] })?;
+        let told = told_of_file(&self.file.pieces, only);
+        source(what, None, told, part, request)
     }
 
     /// The chosen pieces, each by itself, with what it is called. A file that names no pieces is one.
@@ -129,7 +124,7 @@ fn source(
     };
     let faults = |texts: Vec<String>| FileError::of_all(texts.into_iter().map(of_file).collect());
     let as_read = (!look.parts.is_empty()).then(|| mesh.clone());
-    let made = Made::of(mesh, part, request).map_err(faults)?;
+    let (made, unit, unit_assumed) = made(mesh, part, request).map_err(faults)?;
     // A face that was turned, or that has a back now, would be seen from its wrong side in the surface of the file.
     let turned = |finding: &Finding| finding.kind == "triangles-turned";
     let faces_as_before = made.thickened.is_none() && !made.findings.iter().any(turned);
@@ -138,8 +133,8 @@ fn source(
         report: SourceReport {
             file: path.display().to_string(),
             piece: piece.map(str::to_owned),
-            unit: made.unit.name,
-            unit_assumed: made.unit_assumed,
+            unit: unit.name,
+            unit_assumed,
             findings,
             moved_m: made.moved,
             thickened_m: made.thickened,
@@ -147,80 +142,49 @@ fn source(
         mesh: made.mesh,
         as_read: as_read
             .filter(|_| faces_as_before)
-            .map(|mesh| mesh.scaled(made.unit.metres)),
+            .map(|mesh| mesh.scaled(unit.metres)),
         look,
         up: request.up_of(part),
     })
 }
 
-/// A closed surface made of what a file holds.
-struct Made {
-    unit: LengthUnit,
-    unit_assumed: bool,
+/// A closed surface made of what a file holds, its unit, and whether nobody named that.
+fn made(
     mesh: RawMesh,
-    findings: Vec<Finding>,
-    moved: f64,
-    thickened: Option<f64>,
-}
-
-impl Made {
-    fn of(mesh: RawMesh, part: &ImportPart, request: &ImportRequest) -> Result<Self, Vec<String>> {
-        let (path, is_cloud) = (&part.path, mesh.triangles.is_empty());
-        // A vertex of no triangle is no part of the surface, however far away it is.
-        let raw = if is_cloud {
-            mesh
-        } else {
-            mesh.without_unused()
-        };
-        let around = request.thicken.filter(|_| is_cloud).unwrap_or_default();
-        let (unit, unit_assumed) =
-            unit_of(path, &raw, request.unit_of(part), around).map_err(|text| vec![text])?;
-        let (single, file) = (is_single(&raw.vertices), path.display());
-        let raw = raw.scaled(unit.metres);
-        if let (true, Some(thickness)) = (is_cloud, request.thicken) {
-            let (mesh, finding, farthest) = shelled(&raw, single, thickness, &part.path)?;
-            return Ok(Self {
-                unit,
-                unit_assumed,
-                mesh,
-                findings: vec![finding],
-                moved: 0.0,
-                thickened: Some(farthest),
-            });
+    part: &ImportPart,
+    request: &ImportRequest,
+) -> Result<(Repaired, LengthUnit, bool), Vec<String>> {
+    let (path, is_cloud) = (&part.path, mesh.triangles.is_empty());
+    // A vertex of no triangle is no part of the surface, however far away it is.
+    let raw = if is_cloud {
+        mesh
+    } else {
+        mesh.without_unused()
+    };
+    let around = request.thicken.filter(|_| is_cloud).unwrap_or_default();
+    let (unit, unit_assumed) =
+        unit_of(path, &raw, request.unit_of(part), around).map_err(|text| vec![text])?;
+    let (single, file) = (is_single(&raw.vertices), path.display());
+    let raw = raw.scaled(unit.metres);
+    let repaired = match request.thicken.filter(|_| is_cloud) {
+        Some(thickness) => shelled(&raw, single, thickness, path)?,
+        None => {
+            let count = raw.triangles.len();
+            let what = format_args!("{file}: mending {count} triangles");
+            let _progress = Progress::on_triangles(count, what);
+            repair(raw, single, request)?
         }
-        let count = raw.triangles.len();
-        let progress =
-            Progress::on_triangles(count, format_args!("{file}: mending {count} triangles"));
-        let wishes = Wishes {
-            close_holes: request.close_holes,
-            thicken: request.thicken,
-        };
-        let repaired = repair(raw, single, wishes);
-        drop(progress);
-        let Repaired {
-            mesh,
-            findings,
-            moved,
-            thickened,
-        } = repaired?;
-        Ok(Self {
-            unit,
-            unit_assumed,
-            mesh,
-            findings,
-            moved,
-            thickened,
-        })
-    }
+    };
+    Ok((repaired, unit, unit_assumed))
 }
 
-/// A shell around points, what to say of it, and how far its surface is from the nearest of them at most, m.
+/// A shell around points.
 fn shelled(
     cloud: &RawMesh,
     single: bool,
     thickness: f64,
     path: &Path,
-) -> Result<(RawMesh, Finding, f64), Vec<String>> {
+) -> Result<Repaired, Vec<String>> {
     let (count, file) = (cloud.vertices.len(), path.display());
     let (rounding, error) = (weld::rounding(cloud, single), ERROR_SHARE * thickness);
     let readable = rounding <= error; // false for NaN
@@ -246,11 +210,12 @@ fn shelled(
             "; {handles} gaps between points go through it: a larger --thicken closes them if they are not meant"
         );
     }
-    Ok((
+    Ok(Repaired {
         mesh,
-        Finding::new("shelled", &Places::of(parts, None), text),
-        most,
-    ))
+        findings: vec![Finding::new("shelled", &Places::of(parts, None), text)],
+        moved: 0.0,
+        thickened: Some(most),
+    })
 }
 
 /// Which pieces of the file are the body, and what of the file is none.

@@ -34,17 +34,16 @@ pub(super) fn parse(
     let mut first_line_of_largest = (0u32, 0usize);
     for (number, line) in lines(&text) {
         let mut words = words(&line);
+        let fail = |text: String| Fault::at(number, text);
         match words.next() {
             Some("v") => {
                 // Red, green and blue behind the coordinates, as scanners write them.
                 materials.vertex_colours |= words.clone().nth(5).is_some();
-                mesh.vertices.push(
-                    vertex(mesh.vertices.len(), words).map_err(|text| Fault::at(number, text))?,
-                );
+                let vertex = vertex(mesh.vertices.len(), words).map_err(fail)?;
+                mesh.vertices.push(vertex);
             }
             Some("f") => {
-                let corners =
-                    face(words, mesh.vertices.len()).map_err(|text| Fault::at(number, text))?;
+                let corners = face(words, mesh.vertices.len()).map_err(fail)?;
                 let largest = corners.iter().copied().max().unwrap_or(0);
                 if largest > first_line_of_largest.0 || first_line_of_largest.1 == 0 {
                     first_line_of_largest = (largest, number);
@@ -187,9 +186,9 @@ fn coordinates(bytes: &[u8], stand_in: Option<[f64; 2]>) -> Result<Vec<CornerCoo
     let mut faces: Vec<(usize, Vec<u32>, Vec<u32>)> = Vec::new();
     for (number, line) in lines(&text) {
         let mut words = words(&line);
+        let fail = |text: String| Fault::at(number, text);
         match words.next() {
-            Some("v") => vertices
-                .push(vertex(vertices.len(), words).map_err(|text| Fault::at(number, text))?),
+            Some("v") => vertices.push(vertex(vertices.len(), words).map_err(fail)?),
             Some("vt") => {
                 let [u, v] =
                     [words.next(), words.next()].map(|word| word.unwrap_or("0").parse::<f64>());
@@ -203,7 +202,6 @@ fn coordinates(bytes: &[u8], stand_in: Option<[f64; 2]>) -> Result<Vec<CornerCoo
                 });
             }
             Some("f") => {
-                let fail = |text| Fault::at(number, text);
                 let corners = face(words.clone(), vertices.len()).map_err(fail)?;
                 let of_corner = |word| match (coordinate_of(word, pairs.len()), stand_in) {
                     (Err(_), Some(_)) => Ok(NO_COORDINATE),
@@ -252,15 +250,15 @@ fn coordinate_of(word: &str, pairs_so_far: usize) -> Result<u32, String> {
     let index: i64 = second
         .parse()
         .map_err(|_| format!("`{word}` is no index of a texture coordinate; repair the line"))?;
-    let place = if index > 0 {
-        index - 1
-    } else {
-        pairs_so_far as i64 + index
-    };
-    u32::try_from(place)
-        .ok()
-        .filter(|place| index != 0 && *place < u32::MAX)
+    place_of(index, pairs_so_far)
+        .filter(|place| *place != NO_COORDINATE)
         .ok_or_else(|| format!("`{word}` names no texture coordinate; indices start at 1"))
+}
+
+/// The place of an index, which counts from 1, or back from the last of `so_far` where it is negative.
+fn place_of(index: i64, so_far: usize) -> Option<u32> {
+    let before = if index > 0 { -1 } else { so_far as i64 };
+    u32::try_from(before + index).ok().filter(|_| index != 0)
 }
 
 fn vertex<'w>(
@@ -288,17 +286,12 @@ fn face<'w>(
 ) -> Result<Vec<u32>, String> {
     let mut corners = Vec::new();
     for word in words {
-        // v, v/vt, v//vn, v/vt/vn; negative counts back from the last vertex.
+        // v, v/vt, v//vn, v/vt/vn.
         let first = word.split('/').next().unwrap_or_default();
         let index: i64 = first
             .parse()
             .map_err(|_| format!("`{word}` is no vertex index; repair the line"))?;
-        let place = if index > 0 {
-            index - 1
-        } else {
-            vertices_so_far as i64 + index
-        };
-        let place = u32::try_from(place).ok().filter(|_| index != 0);
+        let place = place_of(index, vertices_so_far);
         corners.push(place.ok_or_else(|| format!("`{word}` names no vertex; indices start at 1"))?);
         if corners.len() > MAX_FACE_CORNERS {
             return Err(format!(
@@ -399,16 +392,6 @@ mod tests {
             let of_corners = parse_texture_coordinates(text.as_bytes()).unwrap();
             assert_eq!(of_corners, expected.map(|t| t.map(|c| [f64::from(c), 0.0])));
         }
-        let bow = "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 4\n";
-        let fault = parse(bow.as_bytes()).unwrap_err();
-        assert_eq!(fault.line, Some(5));
-        assert!(
-            fault
-                .text
-                .starts_with("face 1 of 4 corners is no simple polygon"),
-            "{}",
-            fault.text
-        );
     }
 
     #[test]
@@ -435,30 +418,24 @@ mod tests {
 
     #[test]
     fn faults_name_line_and_vertex() {
-        let fault = parse(b"v 0 0 0\nv 0 nan 0\n").unwrap_err();
-        assert_eq!(fault.line, Some(2));
-        assert!(
-            fault.text.contains("vertex 2 has y = NaN"),
-            "{}",
-            fault.text
-        );
-        let fault = parse(b"v 0 0 0\nf 1 2 3\n").unwrap_err();
-        assert_eq!(
-            fault,
-            Fault::at(
+        let bow = "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 4\n";
+        for (text, line, expected) in [
+            ("v 0 0 0\nv 0 nan 0\n", 2, "vertex 2 has y = NaN"),
+            (
+                "v 0 0 0\nf 1 2 3\n",
                 2,
-                "a face names vertex 3, but the file has 1; repair the mesh"
-            )
-        );
-        let fault = parse(b"v 0 0 0\nf 1 1\n").unwrap_err();
-        assert_eq!(
-            fault,
-            Fault::at(2, "a face has 2 corners, but needs three; repair the line")
-        );
-        let fault = parse(b"v 0 0\n").unwrap_err();
-        assert_eq!(
-            fault,
-            Fault::at(1, "a vertex needs three coordinates; repair the line")
-        );
+                "a face names vertex 3, but the file has 1;",
+            ),
+            (
+                "v 0 0 0\nf 1 1\n",
+                2,
+                "a face has 2 corners, but needs three;",
+            ),
+            ("v 0 0\n", 1, "a vertex needs three coordinates;"),
+            (bow, 5, "face 1 of 4 corners is no simple polygon"),
+        ] {
+            let Fault { line: at, text } = parse(text.as_bytes()).unwrap_err();
+            assert!(at == Some(line) && text.starts_with(expected), "{text}");
+        }
     }
 }

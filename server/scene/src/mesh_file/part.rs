@@ -22,16 +22,7 @@ pub(crate) struct MeshPart {
 /// fault of the mesh. At least one of the names must be there.
 pub(crate) fn read_part(path: &Path, only: &[String]) -> Result<MeshPart, FileError> {
     let mut file = MeshFile::read(path)?;
-    let (mesh, look) = if only.is_empty() {
-        file.take_whole()
-    } else {
-        let chosen = file.pieces.chosen(only);
-        let part = file.parts([&chosen[..]]).next();
-        part.filter(|_| !chosen.is_empty()).ok_or_else(|| {
-            let text = file.pieces.no_such(&only[0]);
-            Problem::of_file(path.display(), text)
-        })?
-    };
+    let (mesh, look) = file.take(path, only)?;
     let pieces = file.pieces;
     Ok(MeshPart { mesh, look, pieces })
 }
@@ -83,11 +74,21 @@ impl MeshFile {
         }
     }
 
-    /// All triangles, which are gone from here then.
-    pub(crate) fn take_whole(&mut self) -> (RawMesh, FileLook) {
-        let materials = std::mem::take(&mut self.materials);
-        let look = materials.look(&self.mesh, self.directory.as_deref());
-        (std::mem::take(&mut self.mesh), look)
+    /// The pieces that have one of the names in `only`, of which at least one must be there; without names all, which is gone from here then.
+    pub(crate) fn take(
+        &mut self,
+        path: &Path,
+        only: &[String],
+    ) -> Result<(RawMesh, FileLook), Problem> {
+        let Some(first) = only.first() else {
+            let materials = std::mem::take(&mut self.materials);
+            let look = materials.look(&self.mesh, self.directory.as_deref());
+            return Ok((std::mem::take(&mut self.mesh), look));
+        };
+        let chosen = self.pieces.chosen(only);
+        let part = self.parts([&chosen[..]]).next();
+        part.filter(|_| !chosen.is_empty())
+            .ok_or_else(|| Problem::of_file(path.display(), self.pieces.no_such(first)))
     }
 
     /// Sets of its triangles, each by itself, and how they look.

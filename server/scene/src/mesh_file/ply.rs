@@ -91,14 +91,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
             "face" => faces(element, &mut source, &mut mesh, &mut polygons)?,
             _ => {
                 for number in 0..element.count {
-                    for property in &element.properties {
-                        property
-                            .skip(&mut source)
-                            .map_err(|e| e.in_element(element, number, &source))?;
-                    }
-                    source
-                        .end_element()
-                        .map_err(|e| e.in_element(element, number, &source))?;
+                    element.row(number, &mut source, |source| {
+                        let mut properties = element.properties.iter();
+                        properties.try_for_each(|property| property.skip(source))
+                    })?;
                 }
             }
         }
@@ -252,19 +248,17 @@ fn vertices(element: &Element, source: &mut Source<'_>, mesh: &mut RawMesh) -> R
     }
     for number in 0..element.count {
         let mut coordinates = [0.0; 3];
-        for (place, property) in element.properties.iter().enumerate() {
-            let value = property
-                .read(source)
-                .map_err(|e| e.in_element(element, number, source))?;
-            for (coordinate, wanted) in coordinates.iter_mut().zip([x, y, z]) {
-                if place == wanted {
-                    *coordinate = value;
+        element.row(number, source, |source| {
+            for (place, property) in element.properties.iter().enumerate() {
+                let value = property.read(source)?;
+                for (coordinate, wanted) in coordinates.iter_mut().zip([x, y, z]) {
+                    if place == wanted {
+                        *coordinate = value;
+                    }
                 }
             }
-        }
-        source
-            .end_element()
-            .map_err(|e| e.in_element(element, number, source))?;
+            Ok(())
+        })?;
         let vertex = finite_vertex(number, coordinates).map_err(|text| Fault {
             line: source.finished_line(),
             text,
@@ -290,39 +284,25 @@ fn faces(
     }
     let mut corners: Vec<u32> = Vec::new();
     for number in 0..element.count {
-        for property in &element.properties {
-            match property.count {
-                Some(count) if is_corners(property) => {
-                    let listed = source
-                        .scalar(count)
-                        .map_err(|e| e.in_element(element, number, source))?;
-                    corners.clear();
-                    // A list longer than the file runs into its end: no allocation ahead of the bytes.
-                    for _ in 0..listed as u64 {
-                        let index = source
-                            .scalar(property.scalar)
-                            .map_err(|e| e.in_element(element, number, source))?;
-                        let whole =
-                            index.fract() == 0.0 && (0.0..f64::from(u32::MAX)).contains(&index);
-                        if !whole {
-                            let text =
-                                format!("face {number} names vertex {index}; repair the mesh");
-                            return Err(Fault {
-                                line: source.current_line(),
-                                text,
-                            });
-                        }
-                        corners.push(index as u32);
+        element.row(number, source, |source| {
+            for property in &element.properties {
+                let Some(count) = property.count.filter(|_| is_corners(property)) else {
+                    property.skip(source)?;
+                    continue;
+                };
+                let listed = source.scalar(count)?;
+                corners.clear();
+                // A list longer than the file runs into its end: no allocation ahead of the bytes.
+                for _ in 0..listed as u64 {
+                    let index = source.scalar(property.scalar)?;
+                    if index.fract() != 0.0 || !(0.0..f64::from(u32::MAX)).contains(&index) {
+                        return Err(Broken::Index(index));
                     }
+                    corners.push(index as u32);
                 }
-                _ => property
-                    .skip(source)
-                    .map_err(|e| e.in_element(element, number, source))?,
             }
-        }
-        source
-            .end_element()
-            .map_err(|e| e.in_element(element, number, source))?;
+            Ok(())
+        })?;
         if corners.len() < 3 {
             let text = format!(
                 "face {number} has {} corners, but needs three; repair the mesh",
@@ -336,6 +316,20 @@ fn faces(
         polygons.push(mesh, &corners, number, source.finished_line());
     }
     Ok(())
+}
+
+impl Element {
+    /// One of its rows, by what reads its values.
+    fn row(
+        &self,
+        number: usize,
+        source: &mut Source<'_>,
+        read: impl FnOnce(&mut Source<'_>) -> Result<(), Broken>,
+    ) -> Result<(), Fault> {
+        read(source)
+            .and_then(|()| source.end_element())
+            .map_err(|broken| broken.in_element(self, number, source))
+    }
 }
 
 impl Property {
@@ -364,6 +358,7 @@ enum Broken {
     Word(String),
     MissingInLine,
     LeftInLine,
+    Index(f64),
 }
 
 impl Broken {
@@ -379,6 +374,7 @@ impl Broken {
             }
             Self::MissingInLine => format!("{name} {number} has too few numbers; repair the line"),
             Self::LeftInLine => format!("{name} {number} has too many numbers; repair the line"),
+            Self::Index(index) => format!("{name} {number} names vertex {index}; repair the mesh"),
         };
         Fault {
             line: source.current_line(),
