@@ -10,7 +10,7 @@ use super::met::Met;
 use super::need::SceneNeed;
 use crate::shapes;
 
-fn sphere(radius: f64) -> BodyNeed {
+pub(super) fn sphere(radius: f64) -> BodyNeed {
     let center = Point3::origin();
     let raw = shapes::sphere(radius, 1);
     let mesh = Mesh::new(raw.vertices, raw.triangles).expect("a closed shape");
@@ -24,7 +24,7 @@ fn block() -> BodyNeed {
     BodyNeed::of_mesh("b", &mesh, &Met::default())
 }
 
-fn need(body: BodyNeed, obstacle: BodyNeed) -> SceneNeed {
+pub(super) fn need(body: BodyNeed, obstacle: BodyNeed) -> SceneNeed {
     SceneNeed {
         body,
         obstacles: vec![obstacle],
@@ -39,24 +39,22 @@ fn need(body: BodyNeed, obstacle: BodyNeed) -> SceneNeed {
     }
 }
 
-fn late(need: &SceneNeed, rate: f64, rounds: u32) -> Late {
-    let contact = Contact {
+fn contact(need: &SceneNeed) -> Contact<'_> {
+    Contact {
         need,
         obstacle: &need.obstacles[0],
         errors: [0.0; 2],
-    };
-    contact.late(rate, rounds)
+    }
+}
+
+fn late(need: &SceneNeed, rate: f64, rounds: u32) -> Late {
+    contact(need).late(rate, rounds)
 }
 
 #[test]
 fn two_spheres_turn_about_each_other_like_the_sum_of_their_radii() {
     let need = need(sphere(0.02), sphere(0.03));
-    let contact = Contact {
-        need: &need,
-        obstacle: &need.obstacles[0],
-        errors: [0.0; 2],
-    };
-    assert!((contact.curvature() - 20.0).abs() < 1e-9);
+    assert!((contact(&need).curvature() - 20.0).abs() < 1e-9);
 }
 
 #[test]

@@ -176,31 +176,15 @@ impl Rank {
 
 #[cfg(test)]
 mod tests {
-    use super::super::met::Met;
     use super::*;
-    use god_object::Primitive;
-    use nalgebra::Point3;
-
-    fn sphere(radius: f64) -> BodyNeed {
-        let center = Point3::origin();
-        let raw = crate::shapes::sphere(radius, 1);
-        let mesh = god_object::Mesh::new(raw.vertices, raw.triangles).expect("a closed shape");
-        let primitive = Primitive::Sphere { center, radius };
-        BodyNeed::of_primitive("a", &primitive, &mesh, &Met::default())
-    }
+    use crate::fidelity::contact_tests::{self, sphere};
 
     fn need(body: BodyNeed, obstacle: BodyNeed) -> SceneNeed {
         SceneNeed {
-            body,
-            obstacles: vec![obstacle],
-            size: 0.04,
-            lever: 0.0,
-            stiffness: 1000.0,
             k_s: 0.5,
             speed: 0.2,
-            turn_rate: 1.0,
             force: 1.43,
-            widest_tolerance: 1.8e-6,
+            ..contact_tests::need(body, obstacle)
         }
     }
 
