@@ -3,3 +3,4 @@
 
 mod files;
 mod import;
+mod support;

@@ -1,5 +1,6 @@
 //! What tests, benches and examples of several packages share.
 
+mod base64;
 mod clock;
 mod dense;
 mod hand;
@@ -10,6 +11,7 @@ mod xorshift;
 
 use std::fmt::Display;
 
+pub use base64::base64;
 pub use clock::thread_cpu_us;
 pub use dense::{Soup, subdivided};
 pub use hand::SlidingHand;

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::checks::Folder;
 use taut_scene::shapes::cuboid;
-use taut_scene::{Scene, check, check_in, looping_fault, write_ply};
+use taut_scene::{check, check_in, looping_fault, write_ply};
+
+use crate::support::{Folder, assert_says, built};
 
 /// A scene whose held body has this shape.
 fn held(shape: &str, more: &str) -> String {
@@ -34,7 +35,7 @@ fn obj(key: &str) -> String {
 #[test]
 fn a_mesh_is_checked_in_its_unit() {
     let folder = Folder::new();
-    let part = folder.file("part.ply", write_ply(&cuboid([30.0, 20.0, 10.0])));
+    let part = folder.write("part.ply", write_ply(&cuboid([30.0, 20.0, 10.0])));
     let metres = check(&[&part]).remove(0);
     let notes = metres.notes.join("\n");
     assert!(
@@ -55,7 +56,7 @@ fn a_mesh_is_checked_in_its_unit() {
 #[test]
 fn a_scene_that_names_a_unit_is_not_told_to_name_it() {
     let folder = Folder::new();
-    folder.file("part.ply", write_ply(&cuboid([30.0, 20.0, 10.0])));
+    folder.write("part.ply", write_ply(&cuboid([30.0, 20.0, 10.0])));
     for (more, size) in [
         ("unit = \"mm\", scale = 1000.0", "60.00 m"),
         ("scale = 0.1", "6.000 m"),
@@ -79,8 +80,8 @@ fn the_files_of_a_faulty_scene_are_all_looked_at() {
         + more
         + "[[scenery]]\nname = \"c\"\nshape = { mesh = \"seen.obj\" }\n[hand]\npath = \"loop.csv\"\nloop = true\n[view]\nenvironment = \"no.hdr\"\n";
     let folder = Folder::new();
-    folder.file("motion.csv", "t,x\n");
-    folder.file(
+    folder.write("motion.csv", "t,x\n");
+    folder.write(
         "loop.csv",
         "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,1,0,0,1,0,0,0\n",
     );
@@ -109,7 +110,7 @@ fn a_hand_that_does_not_return_is_told_with_file_and_line() {
     let folder = Folder::new();
     let row = |t: u32, z: f64| format!("{t},0,0,{z},1,0,0,0\n");
     let open = "t,x,y,z,qw,qx,qy,qz\n".to_owned() + &row(0, 0.05) + &row(1, 0.02);
-    let path = folder.file("loop.csv", &open);
+    let path = folder.write("loop.csv", &open);
     let scene = |repeat: bool| {
         held(
             "sphere = { radius = 0.01 }",
@@ -124,7 +125,7 @@ fn a_hand_that_does_not_return_is_told_with_file_and_line() {
     assert!(report.problems[0].file.ends_with("loop.csv"), "{report}");
     assert!(folder.check("s.toml", scene(false)).is_good());
     assert!(looping_fault(&path).is_some());
-    folder.file("loop.csv", open + &row(2, 0.05));
+    folder.write("loop.csv", open + &row(2, 0.05));
     assert!(folder.check("s.toml", scene(true)).is_good());
     assert_eq!(looping_fault(Path::new("none.csv")), None);
 }
@@ -133,13 +134,13 @@ fn a_hand_that_does_not_return_is_told_with_file_and_line() {
 fn chosen_pieces_of_a_file_are_the_shape() {
     let folder = Folder::new();
     for key in ["o", "g"] {
-        folder.file("all.obj", obj(key));
+        folder.write("all.obj", obj(key));
         // A group's name ends at a blank, an object's does not.
         let second = if key == "o" { "my block" } else { "block" };
         for (only, triangles) in [("\"peg\"", 12), (&format!("\"peg\", \"{second}\""), 24)] {
             let shape = format!("mesh = \"all.obj\", only = [{only}]");
-            let path = folder.file("s.toml", held(&shape, ""));
-            let built = Scene::load(&path).and_then(|scene| scene.build()).unwrap();
+            let path = folder.write("s.toml", held(&shape, ""));
+            let built = built(path);
             assert_eq!(built.bodies[0].mesh.triangles.len(), triangles);
             assert_eq!(built.bodies[0].mesh.vertices.len(), triangles * 8 / 12);
         }
@@ -166,9 +167,6 @@ fn chosen_pieces_of_a_file_are_the_shape() {
             assert!(open || told.contains(expected), "{told}");
         }
     }
-    let report = check(&[folder.0.path().join("all.obj")]).remove(0);
-    assert!(
-        report.to_string().contains("its 3 pieces are one body"),
-        "{report}"
-    );
+    let report = check(&[folder.path("all.obj")]).remove(0);
+    assert_says(&report, "its 3 pieces are one body");
 }

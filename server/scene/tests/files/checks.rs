@@ -1,29 +1,13 @@
 //! `check` finds the kind of a file and everything that is wrong with it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use taut_scene::shapes::cuboid;
 use taut_scene::{
     FileKind, FileReport, SHIPPED_WORKBENCH, check, read_mesh, shipped_scene_text, write_ply,
 };
 
-pub(super) struct Folder(pub(super) tempfile::TempDir);
-
-impl Folder {
-    pub(super) fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    pub(super) fn file(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.path().join(name);
-        std::fs::write(&path, content).unwrap();
-        path
-    }
-
-    pub(super) fn check(&self, name: &str, content: impl AsRef<[u8]>) -> FileReport {
-        check(&[self.file(name, content)]).remove(0)
-    }
-}
+use crate::support::{Folder, assert_says, joined};
 
 #[test]
 fn a_sound_mesh_gets_its_figures() {
@@ -34,39 +18,28 @@ fn a_sound_mesh_gets_its_figures() {
     assert!(figures.watertight && figures.oriented);
     assert!((figures.volume_m3 - 0.048).abs() < 1e-12);
     assert_eq!(figures.size_m, [0.2, 0.4, 0.6]);
-    assert!(
-        report
-            .to_string()
-            .contains("12 triangles, 8 vertices, 0.2000 x 0.4000 x 0.6000 m, watertight yes"),
-        "{report}"
+    assert_says(
+        &report,
+        "12 triangles, 8 vertices, 0.2000 x 0.4000 x 0.6000 m, watertight yes",
     );
 }
 
 #[test]
 fn lengths_far_below_a_micrometre_have_digits() {
     let report = Folder::new().check("thin.ply", write_ply(&cuboid([0.1, 0.2, 1e-6])));
-    assert!(
-        report.summary.contains("0.2000 x 0.4000 x 2.000e-6 m,"),
-        "{report}"
-    );
+    assert_says(&report, "0.2000 x 0.4000 x 2.000e-6 m,");
     let scene = "name = \"a\"\n[god_object]\nshape = { sphere = { radius = 0.01 } }\nmass = 1\n[method]\nclearance = 1e-9\n";
     let report = Folder::new().check("scene.toml", scene.as_bytes());
-    assert!(
-        report.summary.contains("rest distance 0.100 nm"),
-        "{report}"
-    );
+    assert_says(&report, "rest distance 0.100 nm");
 }
 
 #[test]
 fn a_closed_part_inside_out_is_named_with_its_place_and_a_cavity_is_not() {
     let with_part = |half: f64, x: f64| {
-        let (mut mesh, part) = (cuboid([0.1; 3]), cuboid([half; 3]));
-        let first = mesh.vertices.len() as u32;
-        let moved = part.vertices.iter().map(|p| p + nalgebra::Vector3::x() * x);
-        mesh.vertices.extend(moved);
-        let turned = part.triangles.iter().map(|t| [t[1], t[0], t[2]]);
-        mesh.triangles.extend(turned.map(|t| t.map(|v| v + first)));
-        write_ply(&mesh)
+        let mut part = cuboid([half; 3]);
+        part.vertices.iter_mut().for_each(|p| p.x += x);
+        part.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        write_ply(&joined([cuboid([0.1; 3]), part]))
     };
     let report = Folder::new().check("inverted.ply", with_part(0.02, 0.3));
     let texts: Vec<&str> = report.problems.iter().map(|p| p.text.as_str()).collect();
@@ -104,7 +77,7 @@ fn a_broken_mesh_is_told_everything_that_is_wrong() {
             "{text}"
         );
     }
-    assert!(report.to_string().contains("watertight NO"), "{report}");
+    assert_says(&report, "watertight NO");
 }
 
 #[test]
@@ -112,19 +85,14 @@ fn an_inside_out_mesh_and_millimetres_are_noticed() {
     let mut mesh = cuboid([30.0, 30.0, 30.0]);
     mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     let report = Folder::new().check("inside.ply", write_ply(&mesh));
-    assert!(
-        report.problems[0]
-            .text
-            .starts_with("the surface is inside out"),
-        "{report}"
-    );
-    assert!(report.notes[0].contains("unit = \"mm\""), "{report}");
+    assert_says(&report.problems[0], "inside.ply: the surface is inside out");
+    assert_says(&report.notes[0], "unit = \"mm\"");
 }
 
 #[test]
 fn a_part_in_millimetres_is_doubted_in_its_scene_and_taken_with_its_unit() {
     let folder = Folder::new();
-    folder.file("part.ply", write_ply(&cuboid([30.0, 20.0, 10.0])));
+    folder.write("part.ply", write_ply(&cuboid([30.0, 20.0, 10.0])));
     let scene = |more: &str| {
         format!(
             "name = \"part\"\n[god_object]\nmass = 1.0\nshape = {{ mesh = \"part.ply\"{more} }}\n[[obstacle]]\nname = \"table\"\n\
@@ -133,10 +101,8 @@ fn a_part_in_millimetres_is_doubted_in_its_scene_and_taken_with_its_unit() {
     };
     let metres = folder.check("metres.toml", scene(""));
     assert_eq!(metres.notes.len(), 1, "{metres}");
-    assert!(
-        metres.notes[0].contains("60.00 m") && metres.notes[0].contains("unit = \"mm\""),
-        "{metres}"
-    );
+    assert_says(&metres.notes[0], "60.00 m");
+    assert_says(&metres.notes[0], "unit = \"mm\"");
     for (more, longest) in [
         (", unit = \"mm\"", "god-object 60.00 mm"),
         (", unit = \"mm\", scale = 2.0", "god-object 120.0 mm"),
@@ -150,18 +116,15 @@ fn a_part_in_millimetres_is_doubted_in_its_scene_and_taken_with_its_unit() {
         assert!(report.summary.contains(longest), "{report}");
     }
     let twice = folder.check("twice.toml", scene(", unit = \"um\""));
-    assert!(twice.notes[0].contains("write no unit"), "{twice}");
+    assert_says(&twice.notes[0], "write no unit");
     let unknown = folder.check("ell.toml", scene(", unit = \"ell\""));
-    assert!(
-        unknown.problems[0].text.contains("\"ell\", but must be"),
-        "{unknown}"
-    );
+    assert_says(&unknown, "\"ell\", but must be");
 }
 
 #[test]
 fn files_are_known_by_ending_and_contents() {
     let folder = Folder::new();
-    folder.file(
+    folder.write(
         "peg-in-a-hole.csv",
         include_str!("../../../scenes/peg-in-a-hole.csv"),
     );
@@ -180,17 +143,9 @@ fn files_are_known_by_ending_and_contents() {
     let trace = folder.check("trace.csv", "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n");
     assert_eq!((trace.kind, trace.is_good()), (FileKind::Trace, true));
     let neither = folder.check("other.toml", "a = 1");
-    assert!(
-        neither.problems[0].text.starts_with("is neither a scene"),
-        "{neither}"
-    );
+    assert_says(&neither, "other.toml: is neither a scene");
     let unknown = folder.check("a.docx", "");
-    assert!(
-        unknown.problems[0]
-            .text
-            .starts_with("is no file that taut knows"),
-        "{unknown}"
-    );
+    assert_says(&unknown, "a.docx: is no file that taut knows");
     let shipped = check(&[Path::new("sphere-on-plane")]).remove(0);
     assert_eq!((shipped.kind, shipped.is_good()), (FileKind::Scene, true));
 }
@@ -203,11 +158,11 @@ fn a_scenes_faults_come_with_lines_and_as_json_values() {
         .replace("k_h", "kh");
     let folder = Folder::new();
     let hand = include_str!("../../../scenes/sphere-on-plane.csv");
-    folder.file("sphere-on-plane.csv", hand);
+    folder.write("sphere-on-plane.csv", hand);
     let report = folder.check("scene.toml", text);
     assert_eq!(report.problems.len(), 3, "{report}");
     assert!(report.problems.iter().all(|p| p.line.is_some()));
-    assert!(report.to_string().contains("3 faults"), "{report}");
+    assert_says(&report, "3 faults");
 }
 
 #[test]
@@ -234,13 +189,13 @@ fn all_formats_give_the_same_box() {
         ("a.obj", obj.into_bytes()),
         ("a.stl", stl.into_bytes()),
     ] {
-        let read = read_mesh(&folder.file(name, content)).unwrap();
+        let read = read_mesh(&folder.write(name, content)).unwrap();
         assert_eq!(
             (read.vertices.len(), read.triangles.len()),
             (8, 12),
             "{name}"
         );
-        assert!(check(&[folder.0.path().join(name)])[0].is_good(), "{name}");
+        assert!(check(&[folder.path(name)])[0].is_good(), "{name}");
     }
 }
 
@@ -276,9 +231,9 @@ fn nodes_without_a_place_are_a_fault_and_clients_that_cost_much_a_note() {
     let off = ("swap = \"scheduled\"", "swap = \"off\"");
     let report = workbench_with(40, &[room, off]);
     assert!(report.is_good(), "{report}");
-    assert!(report.to_string().contains("% of a core"), "{report}");
+    assert_says(&report, "% of a core");
     let report = workbench_with(20, &[]);
-    assert!(report.to_string().contains("`max_clients`"), "{report}");
+    assert_says(&report, "`max_clients`");
     let slow = ("broadcast_rate = 1000", "broadcast_rate = 250");
     let report = workbench_with(0, &[room, slow]);
     assert!(report.is_good() && report.notes.is_empty(), "{report}");
@@ -300,7 +255,7 @@ fn faults_of_meshes_are_told_with_those_of_the_scene_that_names_them() {
     let folder = Folder::new();
     let mut mesh = cuboid([0.1; 3]);
     mesh.triangles.pop();
-    folder.file("open.ply", write_ply(&mesh));
+    folder.write("open.ply", write_ply(&mesh));
     let report = folder.check(
         "faulty.toml",
         "name = \"x\"\nspeed = 3\n[god_object]\nmass = 1.0\nshape = { mesh = \"open.ply\" }\n\

@@ -5,6 +5,8 @@ use std::path::Path;
 use proptest::prelude::*;
 use taut_scene::Scene;
 
+use crate::support::assert_says;
+
 const TEXT: &str = r##"# A bench.
 name = "bench"   # shown
 
@@ -192,7 +194,7 @@ fn what_cannot_be_taken_is_refused_by_name_and_changes_nothing() {
     let said = scene
         .edited(&["plate.color=\"#ffffff\""])
         .expect_err("refused");
-    assert!(said.to_string().contains("would lose"), "{said}");
+    assert_says(&said, "would lose");
 }
 
 #[test]

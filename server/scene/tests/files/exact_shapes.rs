@@ -1,18 +1,17 @@
 //! A primitive is exact unless its tessellation is named.
 
-use std::path::Path;
-
 use god_object::Primitive;
-use taut_scene::{BuiltScene, Scene};
+use taut_scene::BuiltScene;
+
+use crate::support::Folder;
 
 fn scene(body: &str, obstacle: &str) -> BuiltScene {
     let text = format!(
         "name = \"t\"\n[god_object]\nshape = {{ {body} }}\nmass = 1.0\npose = {{ position = [0.0, 0.0, 0.5] }}\n\
          [[obstacle]]\nname = \"o\"\nshape = {{ {obstacle} }}\n"
     );
-    Scene::parse("t.toml", &text, Path::new("."))
-        .and_then(|scene| scene.build())
-        .unwrap_or_else(|error| panic!("{body} over {obstacle}: {error}"))
+    let built = Folder::new().build(&text);
+    built.unwrap_or_else(|error| panic!("{body} over {obstacle}: {error}"))
 }
 
 #[test]

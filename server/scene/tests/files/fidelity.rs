@@ -1,10 +1,11 @@
 //! `fidelity = "auto"`: chosen by the scene, overridden key by key, and nothing at all without the key.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use taut_scene::fidelity::Origin;
-use taut_scene::{FidelityPlan, RawMesh, Scene, SceneError, check, shapes, write_ply};
+use taut_scene::{BuiltScene, FidelityPlan, Scene, SceneError, shapes, write_ply};
+
+use crate::support::{Folder, assert_says, quartered};
 
 const BODY: &str = "name = \"s\"\n[god_object]\nshape = { sphere = { radius = 0.02 } }\nmass = 1.0\npose = { position = [0.0, 0.0, 0.05] }\n";
 const BALL: &str = "[[obstacle]]\nname = \"a\"\nshape = { sphere = { radius = 0.02 } }\n";
@@ -17,10 +18,6 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
 fn plan(text: &str) -> FidelityPlan {
     let built = parse(text).and_then(|scene| scene.build()).unwrap();
     built.fidelity.expect("a choice")
-}
-
-fn complaint(text: &str) -> String {
-    parse(text).expect_err("a fault").to_string()
 }
 
 #[test]
@@ -47,17 +44,17 @@ fn a_curved_scene_is_updated_more_often_than_a_flat_one() {
 
 #[test]
 fn edges_count_where_the_hand_s_path_brings_the_body() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let block = "[[obstacle]]\nname = \"a\"\nshape = { box = { half_extents = [0.05, 0.05, 0.01] } }\npose = { position = [0.0, 0.0, -0.01] }\n";
     let rate = |hand: Option<f64>| {
         let path = hand.map_or(String::new(), |x| {
             let trace = format!("t,x,y,z,qw,qx,qy,qz\n0,0,0,0.02,1,0,0,0\n1,{x},0,0.02,1,0,0,0\n");
-            std::fs::write(folder.path().join("hand.csv"), trace).unwrap();
+            folder.write("hand.csv", trace);
             "[hand]\npath = \"hand.csv\"\n".to_owned()
         });
         let text = format!("{BODY}{block}{path}[fidelity]\nspeed = 0.1\n");
-        let built = Scene::parse("s.toml", &text, folder.path()).and_then(|scene| scene.build());
-        built.unwrap().fidelity.expect("a choice").update_rate_hz
+        let built = folder.build(&text).unwrap();
+        built.fidelity.expect("a choice").update_rate_hz
     };
     let (beside, over, anywhere) = (rate(Some(0.02)), rate(Some(0.06)), rate(None));
     assert!(
@@ -129,42 +126,19 @@ fn rates_and_contacts_can_be_set_and_a_time_bounds_the_work() {
     assert_eq!((plan.budget_j, plan.update_limit_us()), (0.3, 150.0));
 }
 
-/// Every triangle cut into four at the middles of its edges, `times` times.
-fn quartered(mut raw: RawMesh, times: u32) -> RawMesh {
-    for _ in 0..times {
-        let mut middles = HashMap::new();
-        let mut triangles = Vec::new();
-        for [a, b, c] in std::mem::take(&mut raw.triangles) {
-            let mut middle = |p: u32, q: u32| {
-                *middles.entry((p.min(q), p.max(q))).or_insert_with(|| {
-                    let (p, q) = (raw.vertices[p as usize], raw.vertices[q as usize]);
-                    raw.vertices.push(nalgebra::center(&p, &q));
-                    raw.vertices.len() as u32 - 1
-                })
-            };
-            let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-            triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        raw.triangles = triangles;
-    }
-    raw
-}
-
 #[test]
 fn a_mesh_is_simplified_as_far_as_the_budget_allows() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     // Far finer than anyone feels: flat parts cut into many triangles.
     let raw = quartered(shapes::cuboid([0.03, 0.03, 0.01]), 4);
-    std::fs::write(folder.path().join("a.ply"), write_ply(&raw)).unwrap();
+    folder.write("a.ply", write_ply(&raw));
     let mesh = "[[obstacle]]\nname = \"a\"\nshape = { mesh = \"a.ply\" }\npose = { position = [0.0, 0.0, -0.01] }\n";
-    let text = |head: &str| format!("{head}{BODY}{mesh}[coupling]\nk_h = 400.0\n");
     let of = |head: &str| {
-        Scene::parse("s.toml", &text(head), folder.path())
-            .and_then(|scene| scene.build())
-            .unwrap()
+        let text = format!("{head}{BODY}{mesh}[coupling]\nk_h = 400.0\n");
+        folder.build(&text).unwrap()
     };
     let (auto, plain) = (of("fidelity = \"auto\"\n"), of(""));
-    let triangles = |built: &taut_scene::BuiltScene| built.bodies[1].mesh.triangles.len();
+    let triangles = |built: &BuiltScene| built.bodies[1].mesh.triangles.len();
     assert_eq!(triangles(&plain), 12 * 4_usize.pow(4));
     assert!(triangles(&auto) < triangles(&plain) / 10);
     assert!(auto.simplified[0].max_error > 0.0);
@@ -186,28 +160,25 @@ fn a_budget_that_cannot_be_met_is_said() {
 
 #[test]
 fn faults_name_the_line_and_the_nearest_key() {
-    let said = complaint(&format!("fidelity = \"best\"\n{BODY}{BALL}"));
-    assert!(said.contains("s.toml:1") && said.contains("auto"), "{said}");
     let table = BODY.replace("[god_object]", "[fidelity]\nbudget = 0.3\n[god_object]");
-    let said = complaint(&format!("{table}{BALL}"));
-    assert!(
-        said.contains("s.toml:3") && said.contains("budget_j"),
-        "{said}"
-    );
-    let said = complaint(&format!("{BODY}{BALL}[fidelity]\ncontacts = 9\n"));
-    assert!(said.contains("contacts") && said.contains('8'), "{said}");
+    for (text, parts) in [
+        (format!("fidelity = \"best\"\n{BODY}"), ["s.toml:1", "auto"]),
+        (table, ["s.toml:3", "budget_j"]),
+        (
+            format!("{BODY}[fidelity]\ncontacts = 9\n"),
+            ["contacts", "8"],
+        ),
+    ] {
+        let fault = parse(&(text + BALL)).expect_err("a fault");
+        parts.iter().for_each(|part| assert_says(&fault, part));
+    }
 }
 
 #[test]
 fn check_prints_the_choice_with_its_reasons() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("s.toml");
-    std::fs::write(&file, format!("fidelity = \"auto\"\n{BODY}{BALL}")).unwrap();
-    let reports = check(&[&file]);
-    let said = reports[0].to_string();
-    assert!(reports[0].fidelity.is_some());
-    assert!(
-        said.contains("fidelity.update_rate") && said.contains("between two updates"),
-        "{said}"
-    );
+    let text = format!("fidelity = \"auto\"\n{BODY}{BALL}");
+    let report = Folder::new().check("s.toml", text);
+    assert!(report.fidelity.is_some());
+    assert_says(&report, "fidelity.update_rate");
+    assert_says(&report, "between two updates");
 }

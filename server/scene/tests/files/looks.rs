@@ -1,38 +1,19 @@
 //! How bodies look: what a scene says, what their mesh files say, what is lost; and what is only seen.
 
-use std::path::{Path, PathBuf};
-
 use taut_scene::shapes::cuboid;
-use taut_scene::{Appearance, BuiltScene, ImportRequest, Scene, check, import};
+use taut_scene::{Appearance, BuiltBody, ImportRequest, import};
 
-struct Folder(tempfile::TempDir);
+use crate::support::{Folder, assert_says, built};
 
 impl Folder {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.path().join(name);
-        std::fs::write(&path, content).unwrap();
-        path
-    }
-
-    /// A scene with this in the hand, and with more of the file after it.
-    fn built(&self, held: &str, rest: &str) -> BuiltScene {
-        let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{held}\n{rest}");
-        let scene = Scene::parse("s.toml", &text, self.0.path());
-        scene.and_then(|scene| scene.build()).unwrap()
-    }
-
     /// What the god-object of this mesh file looks like, and what is lost.
     fn look(&self, file: &str) -> (Appearance, Vec<String>) {
-        let built = self.built(&format!("shape = {{ mesh = \"{file}\" }}"), "");
+        let built = self.holding(&format!("shape = {{ mesh = \"{file}\" }}"), "");
         (built.bodies[0].appearance, built.lost_looks)
     }
 
     /// A box as glTF: five of its sides of material 0, the last of the second of `materials`.
-    fn gltf(&self, name: &str, materials: &str, more: &str) {
+    fn box_gltf(&self, name: &str, materials: &str, more: &str) {
         let cube = cuboid([0.01, 0.02, 0.03]);
         let mut bytes = Vec::new();
         for index in cube.triangles.iter().flatten() {
@@ -58,14 +39,6 @@ impl Folder {
     }
 }
 
-fn fault(held: &str) -> String {
-    let text = format!(
-        "name = \"x\"\n[god_object]\nmass = 1.0\nshape = {{ sphere = {{ radius = 0.01 }} }}\n{held}\n"
-    );
-    let parsed = Scene::parse("s.toml", &text, Path::new(""));
-    parsed.expect_err("a fault").to_string()
-}
-
 const SPHERE: &str = "shape = { sphere = { radius = 0.01 } }\n";
 const STEEL: &str = r#"{"name":"steel","pbrMetallicRoughness":{"baseColorFactor":[0.25,0.5,0.75,0.3],"roughnessFactor":0.5}}"#;
 const RED: &str =
@@ -77,7 +50,7 @@ fn a_scene_says_how_its_bodies_look() {
     let held = format!("{SPHERE}color = \"#ff8000\"\nroughness = 0.25\nopacity = 1");
     let rest = "[[obstacle]]\nname = \"o\"\nshape = { plane = {} }\npose = { position = [0.0, 0.0, -0.1] }\n\
                 color = [0.5, 0, 1]\nmetallic = 1.0\n";
-    let built = folder.built(&held, rest);
+    let built = folder.holding(&held, rest);
     let [held, stands] = [0, 1].map(|body| built.bodies[body].appearance);
     let [red, green, blue] = held.color.unwrap();
     assert!(
@@ -92,7 +65,7 @@ fn a_scene_says_how_its_bodies_look() {
     assert_eq!((stands.roughness, stands.metallic), (None, Some(1.0)));
     // Nothing said is nothing.
     assert_eq!(
-        folder.built(SPHERE, "").bodies[0].appearance,
+        folder.holding(SPHERE, "").bodies[0].appearance,
         Appearance::default()
     );
 }
@@ -129,15 +102,16 @@ fn what_is_no_colour_or_no_share_is_refused_with_its_line() {
         ),
         ("colour = \"#ffffff\"", "did you mean `color`?"),
     ] {
-        let text = fault(held);
-        assert!(text.contains(expected), "{held}: {text}");
+        let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{SPHERE}{held}\n");
+        let fault = Folder::new().parse(&text).expect_err(held);
+        assert_says(&fault, expected);
     }
 }
 
 #[test]
 fn the_material_of_a_gltf_file_is_the_bodys_where_the_scene_says_nothing() {
     let folder = Folder::new();
-    folder.gltf("a.gltf", &format!("{STEEL},{STEEL}"), "");
+    folder.box_gltf("a.gltf", &format!("{STEEL},{STEEL}"), "");
     let (look, lost) = folder.look("a.gltf");
     assert_eq!(look.color, Some([0.25, 0.5, 0.75]));
     // As glTF has it: no factor is 1, and an opaque material has no opacity.
@@ -147,22 +121,22 @@ fn the_material_of_a_gltf_file_is_the_bodys_where_the_scene_says_nothing() {
     );
     assert_eq!(lost, [""; 0]);
     let held = "shape = { mesh = \"a.gltf\" }\ncolor = [0.0, 0.0, 0.0]\nmetallic = 0";
-    let said = folder.built(held, "").bodies[0].appearance;
+    let said = folder.holding(held, "").bodies[0].appearance;
     assert_eq!(
         (said.color, said.metallic, said.roughness),
         (Some([0.0; 3]), Some(0.0), Some(0.5))
     );
     let blend = STEEL.replace("{\"name\"", "{\"alphaMode\":\"BLEND\",\"name\"");
-    folder.gltf("a.gltf", &format!("{blend},{blend}"), "");
+    folder.box_gltf("a.gltf", &format!("{blend},{blend}"), "");
     assert_eq!(folder.look("a.gltf").0.opacity, Some(0.3));
 }
 
 #[test]
 fn triangles_look_as_their_own_materials_say() {
     let folder = Folder::new();
-    folder.gltf("a.gltf", &format!("{STEEL},{RED}"), "");
+    folder.box_gltf("a.gltf", &format!("{STEEL},{RED}"), "");
     let looks_of = |held: &str| {
-        let built = folder.built(held, "");
+        let built = folder.holding(held, "");
         let count = |(look, count): &(Appearance, usize)| (look.color, look.roughness, *count);
         let looks: Vec<_> = built.bodies[0].looks.iter().map(count).collect();
         (looks, built.lost_looks)
@@ -183,24 +157,14 @@ fn triangles_look_as_their_own_materials_say() {
 #[test]
 fn an_imported_part_is_seen_with_the_looks_of_its_file() {
     let folder = Folder::new();
-    folder.gltf("a.gltf", &format!("{STEEL},{RED}"), "");
-    let made = folder.0.path().join("made");
-    let report = import(&ImportRequest {
-        parts: vec![folder.0.path().join("a.gltf").into()],
-        folder: made.clone(),
-        ..ImportRequest::default()
-    });
-    let report = report.unwrap();
+    folder.box_gltf("a.gltf", &format!("{STEEL},{RED}"), "");
+    let report = import(&folder.request(&["a.gltf"])).unwrap();
     assert!(!report.to_string().contains("of its materials"), "{report}");
-    let built = Scene::load(&made.join("scene.toml"))
-        .and_then(|scene| scene.build())
-        .unwrap();
-    let direct = folder.built("shape = { mesh = \"a.gltf\" }", "");
+    let built = built(&report.scene);
+    let direct = folder.holding("shape = { mesh = \"a.gltf\" }", "");
     let [seen, asked] = [&built.bodies[0], &direct.bodies[0]];
     assert_eq!(seen.mesh.triangles.len(), 12);
-    let counts = |body: &taut_scene::BuiltBody| -> Vec<usize> {
-        body.looks.iter().map(|(_, count)| *count).collect()
-    };
+    let counts = |body: &BuiltBody| Vec::from_iter(body.looks.iter().map(|(_, count)| *count));
     assert_eq!(counts(seen), counts(asked));
     for ((seen, _), (asked, _)) in seen.looks.iter().zip(&asked.looks) {
         let [a, b] = [seen, asked].map(|look| look.color.unwrap());
@@ -232,18 +196,14 @@ fn a_part_that_import_turned_is_drawn_as_it_is_felt() {
         text += &format!("usemtl m{}\nf {} {} {}\n", place % 2, a + 1, c + 1, b + 1);
     }
     folder.write("a.mtl", "newmtl m0\nKd 1 0 0\nnewmtl m1\nKd 0 1 0\n");
-    let report = import(&ImportRequest {
-        parts: vec![folder.write("a.obj", text).into()],
-        folder: folder.0.path().join("made"),
-        unit: Some("m".parse().unwrap()),
-        ..ImportRequest::default()
-    });
-    let report = report.unwrap();
-    let said = report.to_string();
-    assert!(
-        said.contains("inside out") && said.contains("of its materials"),
-        "{said}"
-    );
+    folder.write("a.obj", text);
+    let request = ImportRequest {
+        unit: "m".parse().ok(),
+        ..folder.request(&["a.obj"])
+    };
+    let report = import(&request).unwrap();
+    assert_says(&report, "inside out");
+    assert_says(&report, "of its materials");
     let scene = std::fs::read_to_string(&report.scene).unwrap();
     assert!(
         !scene.contains("visual") && scene.contains("color"),
@@ -254,10 +214,10 @@ fn a_part_that_import_turned_is_drawn_as_it_is_felt() {
 #[test]
 fn what_is_drawn_may_be_another_form_than_what_is_felt() {
     let folder = Folder::new();
-    folder.gltf("a.gltf", &format!("{STEEL},{RED}"), "");
+    folder.box_gltf("a.gltf", &format!("{STEEL},{RED}"), "");
     let open = "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nf 1 2 3\n";
     folder.write("sheet.obj", open);
-    let built = folder.built(
+    let built = folder.holding(
         "shape = { sphere = { radius = 0.02 } }\nvisual = { mesh = \"a.gltf\", unit = \"cm\" }",
         "[[obstacle]]\nname = \"plate\"\nshape = { box = { half_extents = [0.1, 0.1, 0.01] } }\n\
          pose = { position = [0.0, 0.0, -0.2] }\nvisual = { mesh = \"sheet.obj\" }\ncolor = \"#ff0000\"\n",
@@ -279,20 +239,17 @@ fn what_is_drawn_may_be_another_form_than_what_is_felt() {
         ),
         ("{}", "names 0 forms"),
     ] {
-        let text = format!(
-            "name = \"x\"\n[god_object]\nmass = 1.0\nshape = {{ sphere = {{ radius = 0.02 }} }}\nvisual = {visual}\n"
-        );
-        let scene = Scene::parse("s.toml", &text, folder.0.path());
-        let refused = scene.and_then(|scene| scene.build()).map(|_| ());
-        let text = refused.expect_err("refused").to_string();
-        assert!(text.contains(said) && text.contains("s.toml:5"), "{text}");
+        let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{SPHERE}visual = {visual}\n");
+        let refused = folder.build(&text).expect_err("refused");
+        assert_says(&refused, said);
+        assert_says(&refused, "s.toml:5");
     }
 }
 
 #[test]
 fn what_a_body_cannot_show_of_its_file_is_said_once() {
     let folder = Folder::new();
-    folder.gltf("a.gltf", &format!("{STEEL},{RED}"), ",\"COLOR_0\":2");
+    folder.box_gltf("a.gltf", &format!("{STEEL},{RED}"), ",\"COLOR_0\":2");
     let (look, lost) = folder.look("a.gltf");
     assert_eq!(look.color, Some([0.25, 0.5, 0.75]));
     assert_eq!(
@@ -304,7 +261,7 @@ fn what_a_body_cannot_show_of_its_file_is_said_once() {
         "\"roughnessFactor\"",
         "\"baseColorTexture\":{\"index\":0},\"roughnessFactor\"",
     );
-    folder.gltf("b.gltf", &format!("{picture},{picture}"), "");
+    folder.box_gltf("b.gltf", &format!("{picture},{picture}"), "");
     let (look, lost) = folder.look("b.gltf");
     assert_eq!(
         (look.color, look.roughness),
@@ -313,13 +270,13 @@ fn what_a_body_cannot_show_of_its_file_is_said_once() {
     let why = "is not drawn: its texture \"a.png\", which cannot be opened";
     assert!(lost.len() == 1 && lost[0].contains(why), "{lost:?}");
     let white = picture.replace("[0.25,0.5,0.75,0.3]", "[1,1,1,1]");
-    folder.gltf("c.gltf", &format!("{white},{white}"), "");
+    folder.box_gltf("c.gltf", &format!("{white},{white}"), "");
     assert_eq!(folder.look("c.gltf").0.color, None);
     // A scene that names a colour knows what it does.
-    let built = folder.built("shape = { mesh = \"b.gltf\" }\ncolor = \"#000000\"", "");
+    let built = folder.holding("shape = { mesh = \"b.gltf\" }\ncolor = \"#000000\"", "");
     assert_eq!(built.lost_looks, [""; 0]);
     let scene = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { mesh = \"b.gltf\" }\n";
-    let report = check(&[folder.write("s.toml", scene)]).remove(0);
+    let report = folder.check("s.toml", scene);
     assert!(report.is_good() && report.notes == lost, "{report}");
 }
 
@@ -413,30 +370,23 @@ fn a_part_whose_library_calls_opaque_transparent_is_seen() {
         (Some(0.0), unseen.map(str::to_owned).to_vec())
     );
     let shape = "shape = { mesh = \"a.obj\" }\ncolor = \"#000000\"";
-    assert_eq!(folder.built(shape, "").lost_looks, unseen);
-    let seen = folder.built(&format!("{shape}\nopacity = 1"), "");
+    assert_eq!(folder.holding(shape, "").lost_looks, unseen);
+    let seen = folder.holding(&format!("{shape}\nopacity = 1"), "");
     assert_eq!(seen.lost_looks, [""; 0]);
 }
 
 #[test]
 fn an_import_writes_the_look_of_its_parts_into_the_scene() {
     let folder = Folder::new();
-    folder.gltf("a.gltf", &format!("{RED},{RED}"), "");
-    let report = import(&ImportRequest {
-        parts: vec![folder.0.path().join("a.gltf").into()],
-        folder: folder.0.path().join("out"),
-        ..ImportRequest::default()
-    })
-    .unwrap();
+    folder.box_gltf("a.gltf", &format!("{RED},{RED}"), "");
+    let report = import(&folder.request(&["a.gltf"])).unwrap();
     let text = std::fs::read_to_string(&report.scene).unwrap();
-    assert!(
-        text.contains("\ncolor = \"#ff0000\"\nroughness = 1.0\nmetallic = 0.0\n"),
-        "{text}"
+    assert_says(
+        &text,
+        "\ncolor = \"#ff0000\"\nroughness = 1.0\nmetallic = 0.0\n",
     );
-    let built = Scene::load(Path::new(&report.scene))
-        .and_then(|scene| scene.build())
-        .unwrap();
-    assert_eq!(built.bodies[0].appearance.color, Some([1.0, 0.0, 0.0]));
+    let color = built(&report.scene).bodies[0].appearance.color;
+    assert_eq!(color, Some([1.0, 0.0, 0.0]));
 }
 
 #[test]
@@ -446,7 +396,7 @@ fn scenery_is_seen_and_never_touched() {
     folder.write("sheet.obj", "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n");
     let rest = "[[scenery]]\nname = \"sheet\"\nshape = { mesh = \"sheet.obj\", unit = \"dm\" }\n\
                 color = \"#ffffff\"\npose = { position = [0.0, 0.0, 0.005] }\n";
-    let built = folder.built(SPHERE, rest);
+    let built = folder.holding(SPHERE, rest);
     assert_eq!((built.bodies.len(), built.world.obstacles.len()), (1, 0));
     let sheet = &built.scenery[0];
     assert_eq!(
@@ -460,11 +410,7 @@ fn scenery_is_seen_and_never_touched() {
     assert_eq!(sheet.appearance.color, Some([1.0; 3]));
     let refused = |rest: &str| {
         let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{SPHERE}{rest}");
-        let scene = Scene::parse("s.toml", &text, folder.0.path());
-        scene
-            .and_then(|scene| scene.build())
-            .expect_err("a fault")
-            .to_string()
+        folder.build(&text).expect_err("a fault")
     };
     for (from, to, expected) in [
         ("name = \"sheet\"\n", "", "`name` is missing in [[scenery]]"),
@@ -485,13 +431,10 @@ fn scenery_is_seen_and_never_touched() {
         ),
     ] {
         let text = refused(&rest.replace(from, to));
-        assert!(text.contains(expected), "{text}");
+        assert_says(&text, expected);
     }
     let twice = refused(&format!("{rest}{rest}"));
-    assert!(
-        twice.contains("two bodies of the name \"sheet\""),
-        "{twice}"
-    );
+    assert_says(&twice, "two bodies of the name \"sheet\"");
 }
 
 #[test]
@@ -501,26 +444,26 @@ fn the_files_of_a_scene_are_those_of_its_scenery_and_of_its_light_too() {
     folder.write("hall.hdr", "");
     let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { sphere = { radius = 0.01 } }\n\
         [[scenery]]\nname = \"s\"\nshape = { mesh = \"seen.ply\" }\n[view]\nenvironment = \"hall.hdr\"\n";
-    let scene = Scene::parse("s.toml", text, folder.0.path()).unwrap();
+    let scene = folder.parse(text).unwrap();
     let files = scene.files().unwrap();
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["seen.ply", "hall.hdr"]);
     // What is no picture is named with its file when the scene is built.
     let faults = format!("{:?}", scene.build().unwrap_err().problems());
-    assert!(faults.contains("cannot be read as the light"), "{faults}");
+    assert_says(&faults, "cannot be read as the light");
 }
 
 #[test]
 fn the_files_of_a_scene_are_those_that_its_meshes_are_read_with_too() {
     let folder = Folder::new();
-    std::fs::create_dir(folder.0.path().join("parts")).unwrap();
-    folder.gltf("Box.GLTF", &format!("{STEEL},{STEEL}"), "");
+    std::fs::create_dir(folder.path("parts")).unwrap();
+    folder.box_gltf("Box.GLTF", &format!("{STEEL},{STEEL}"), "");
     let libraries = "mtllib my lib.mtl\nmtllib none.mtl\nmtllib ../box.bin\n";
     folder.write("parts/a.OBJ", format!("{libraries}{TETRAHEDRON}"));
     folder.write("parts/my lib.mtl", "");
     let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { mesh = \"parts/a.OBJ\" }\n\
         [[scenery]]\nname = \"s\"\nshape = { mesh = \"Box.GLTF\" }\n";
-    let scene = Scene::parse("s.toml", text, folder.0.path()).unwrap();
+    let scene = folder.parse(text).unwrap();
     let files = scene.files().unwrap();
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(
@@ -528,6 +471,6 @@ fn the_files_of_a_scene_are_those_that_its_meshes_are_read_with_too() {
         ["parts/a.OBJ", "parts/my lib.mtl", "Box.GLTF", "box.bin"]
     );
     for (name, found) in &files {
-        assert_eq!(*found, folder.0.path().join(name));
+        assert_eq!(*found, folder.path(name));
     }
 }

@@ -5,6 +5,8 @@ use std::path::Path;
 use proptest::prelude::*;
 use taut_scene::{Scene, Workbench};
 
+use crate::support::{Folder, assert_says};
+
 pub(super) const GOOD: &str = r#"name = "test"
 [god_object]
 shape = { sphere = { radius = 0.01 } }
@@ -292,16 +294,14 @@ fn all_faults_are_reported_in_the_order_of_the_file() {
 
 #[test]
 fn an_open_mesh_is_refused_with_the_place() {
-    let directory = tempfile::tempdir().unwrap();
-    std::fs::write(
-        directory.path().join("open.obj"),
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
-    )
-    .unwrap();
+    let folder = Folder::new();
+    folder.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     let text = changed(BALL, "{ mesh = \"open.obj\" }");
-    let scene = Scene::parse("s.toml", &text, directory.path()).unwrap();
-    let found = scene.build().unwrap_err().to_string();
-    assert!(found.starts_with("s.toml:3: the mesh \"open.obj\" cannot be used: 3 edges have one triangle only, the first about (0.50000, 0.00000, 0.00000) m"), "{found}");
+    let found = folder.build(&text).unwrap_err();
+    assert_says(
+        &found,
+        "s.toml:3: the mesh \"open.obj\" cannot be used: 3 edges have one triangle only, the first about (0.50000, 0.00000, 0.00000) m",
+    );
 }
 
 /// The stiffness goes with the mass: a scene of 1e-300 kg would read well and never push.
@@ -310,9 +310,9 @@ fn a_mass_that_no_hand_holds_is_refused() {
     for mass in ["mass = 1e-300", "mass = 1e12", "density = 1e-9"] {
         let scene = parse(&changed("mass = 1.0", mass)).unwrap();
         let found = scene.build().unwrap_err().to_string();
-        assert!(
-            found.contains("is not between 1e-6 and 1e6; check mass, density and scale"),
-            "{found}"
+        assert_says(
+            &found,
+            "is not between 1e-6 and 1e6; check mass, density and scale",
         );
     }
 }

@@ -2,9 +2,10 @@
 
 use god_object::{RotationMetric, SolverKind, Texture};
 use nalgebra::Point3;
-use taut_scene::{MassSpec, Scene};
+use taut_scene::MassSpec;
 
 use super::scene_faults::{GOOD, SINE, changed, parse};
+use crate::support::{Folder, assert_says};
 
 #[test]
 fn the_example_of_the_interface_is_read() {
@@ -86,22 +87,19 @@ fn overrides_change_any_key_and_are_checked_like_the_file() {
         changed.build().unwrap().reference_point(),
         Point3::new(0.0, 0.1, 0.0)
     );
-    let found = scene
-        .with_override("coupling.k_ss=1.0")
-        .unwrap_err()
-        .to_string();
-    assert_eq!(
-        found,
-        "--set coupling.k_ss=1.0: unknown key `k_ss` in [coupling]; did you mean `k_s`?"
-    );
-    let found = scene
-        .with_override("obstacle.3.name=a")
-        .unwrap_err()
-        .to_string();
-    assert_eq!(
-        found,
-        "--set obstacle.3.name=a: `3` is no place in a list of 1; count from 0"
-    );
+    for (set, fault) in [
+        (
+            "coupling.k_ss=1.0",
+            "unknown key `k_ss` in [coupling]; did you mean `k_s`?",
+        ),
+        (
+            "obstacle.3.name=a",
+            "`3` is no place in a list of 1; count from 0",
+        ),
+    ] {
+        let found = scene.with_override(set).unwrap_err().to_string();
+        assert_eq!(found, format!("--set {set}: {fault}"));
+    }
 }
 
 #[test]
@@ -129,18 +127,16 @@ fn density_and_reference_point_give_mass_and_inertia_of_the_solid() {
 
 #[test]
 fn friction_passivity_and_a_height_map_reach_the_method() {
-    let directory = tempfile::tempdir().expect("a directory");
+    let folder = Folder::new();
     let grey = image::DynamicImage::new_luma16(16, 8);
-    grey.save(directory.path().join("flat.png"))
-        .expect("written");
+    grey.save(folder.path("flat.png")).expect("written");
     let text = changed("friction = 0.0", "friction = 0.3")
         .replace("look_ahead = true", "look_ahead = true\npassive = true")
         .replace(
             SINE,
             "height_map = { file = \"flat.png\", tile = 0.05, amplitude = 2e-4, mapping = \"triplanar\" }",
         );
-    let scene = Scene::parse("s.toml", &text, directory.path()).expect("a scene");
-    let built = scene.build().expect("a built scene");
+    let built = folder.build(&text).expect("a built scene");
     assert!(built.settings.passive);
     let surface = &built.world.obstacles[0].surface;
     assert_eq!(surface.friction, 0.3);
@@ -153,22 +149,20 @@ fn friction_passivity_and_a_height_map_reach_the_method() {
 
 #[test]
 fn a_height_map_is_laid_on_by_the_texture_coordinates_of_a_mesh_file() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let at = |name: &str| directory.path().join(name);
-    image::DynamicImage::new_luma16(16, 8)
-        .save(at("flat.png"))
-        .expect("written");
+    let folder = Folder::new();
+    let grey = image::DynamicImage::new_luma16(16, 8);
+    grey.save(folder.path("flat.png")).expect("written");
     // A tetrahedron whose faces all lie on the same part of the picture.
     let mesh = "v 0 0 0\nv 0.02 0 0\nv 0 0.02 0\nv 0 0 0.02\nvt 0 0\nvt 1 0\nvt 0 1\n\
                 f 1/1 3/2 2/3\nf 1/1 2/2 4/3\nf 1/1 4/2 3/3\nf 2/1 3/2 4/3\n";
-    std::fs::write(at("part.obj"), mesh).expect("written");
+    folder.write("part.obj", mesh);
     let scene_with = |shape: &str| {
         let text = changed(
             SINE,
             "height_map = { file = \"flat.png\", amplitude = 2e-4, mapping = \"uv\" }",
         )
         .replace("{ box = { half_extents = [0.1, 0.1, 0.01] } }", shape);
-        Scene::parse("s.toml", &text, directory.path()).and_then(|scene| scene.build())
+        folder.build(&text)
     };
     let built = scene_with("{ mesh = \"part.obj\" }").expect("a built scene");
     let Some(Texture::UvHeightMap(texture)) = &built.world.obstacles[0].surface.texture else {
@@ -176,16 +170,10 @@ fn a_height_map_is_laid_on_by_the_texture_coordinates_of_a_mesh_file() {
     };
     assert_eq!((texture.map.width(), texture.amplitude), (16, 2e-4));
 
-    let refused = |shape: &str| scene_with(shape).expect_err("refused").to_string();
+    let refused = |shape: &str| scene_with(shape).expect_err("refused");
     let text = refused("{ sphere = { radius = 0.01 } }");
-    assert!(
-        text.contains("needs the texture coordinates of a mesh file"),
-        "{text}"
-    );
-    std::fs::write(at("bare.obj"), mesh.replace("/1", "")).expect("written");
+    assert_says(&text, "needs the texture coordinates of a mesh file");
+    folder.write("bare.obj", mesh.replace("/1", ""));
     let text = refused("{ mesh = \"bare.obj\" }");
-    assert!(
-        text.contains("bare.obj:8: `1` names no texture coordinate"),
-        "{text}"
-    );
+    assert_says(&text, "bare.obj:8: `1` names no texture coordinate");
 }

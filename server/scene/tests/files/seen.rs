@@ -1,20 +1,16 @@
 //! What is only seen: hands, boards, what is carried about, and parts of bodies of another opacity.
 
-use std::path::Path;
-
 use god_object::Pose;
 use nalgebra::{Point3, Vector3};
-use taut_scene::{BuiltScene, Carrier, ImportRequest, Scene, import};
+use taut_scene::{BuiltScene, Carrier, ImportRequest, import};
+
+use crate::support::{Folder, assert_says};
 
 const HELD: &str = "name = \"x\"\n[god_object]\nmass = 1.0\n";
 const BALL: &str = "shape = { sphere = { radius = 0.01 } }\n";
 
-fn parsed(text: &str, folder: &Path) -> Scene {
-    Scene::parse("s.toml", text, folder).unwrap()
-}
-
-fn built(text: &str, folder: &Path) -> BuiltScene {
-    parsed(text, folder).build().unwrap()
+fn built(text: &str) -> BuiltScene {
+    Folder::new().build(text).unwrap()
 }
 
 #[test]
@@ -27,7 +23,7 @@ fn a_hand_goes_where_the_body_or_the_device_goes() {
          pose = {{ position = [0.0, 0.0, 0.01] }}\n\
          [[scenery]]\nname = \"other\"\nshape = {{ hand = {{ side = \"left\" }} }}\ncarried_by = \"device\"\n"
     );
-    let scene = built(&text, Path::new(""));
+    let scene = built(&text);
     let carried: Vec<_> = scene.carried.iter().map(|it| (it.place, it.by)).collect();
     assert_eq!(carried, [(1, Carrier::GodObject), (2, Carrier::Device)]);
     let pose = Pose::translation(0.0, 0.0, 0.01);
@@ -36,7 +32,7 @@ fn a_hand_goes_where_the_body_or_the_device_goes() {
     // Skin and cuff; a colour is that of all of it.
     assert_eq!(scene.scenery[1].looks.len(), 2);
     let grey = text.replace("[0.0, 0.0, 0.01] }", "[0.0, 0.0, 0.01] }\ncolor = \"grey\"");
-    assert_eq!(built(&grey, Path::new("")).scenery[1].looks, []);
+    assert_eq!(built(&grey).scenery[1].looks, []);
     // Its arm comes from -y, above.
     let (low, high) = scene.scenery[1].mesh.bounds().unwrap();
     assert!(
@@ -52,7 +48,7 @@ fn a_board_has_its_text_on_its_front_in_any_colour() {
             "{HELD}{BALL}[[scenery]]\nname = \"board\"\n\
              shape = {{ board = {{ title = \"Übung\", text = \"one\\ntwo\", width = 0.2 }} }}\n{more}\n"
         );
-        built(&text, Path::new("")).scenery.remove(0)
+        built(&text).scenery.remove(0)
     };
     let (plain, red) = (board(""), board("color = [0.5, 0.0, 0.0]"));
     for board in [&plain, &red] {
@@ -103,16 +99,16 @@ fn what_is_only_seen_is_refused_where_it_would_be_felt() {
             "width",
         ),
     ] {
-        let error = Scene::parse("s.toml", &text, Path::new("")).expect_err("a fault");
-        assert!(error.to_string().contains(said), "{error}");
+        let error = Folder::new().parse(&text).expect_err("a fault");
+        assert_says(&error, said);
     }
     // As what is drawn of a body a hand may be.
     let visual = format!("{HELD}{BALL}visual = {{ hand = {{ length = 0.1 }} }}\n");
-    assert!(built(&visual, Path::new("")).bodies[0].mesh.triangles.len() > 1000);
+    assert!(built(&visual).bodies[0].mesh.triangles.len() > 1000);
 }
 
 /// A pile of `count` tetrahedra side by side, each of a material of its own, with these values of `d`.
-fn pile(folder: &Path, dissolved: &[f64]) {
+fn pile(folder: &Folder, dissolved: &[f64]) {
     let (mut obj, mut mtl) = ("mtllib pile.mtl\n".to_owned(), String::new());
     for (i, d) in dissolved.iter().enumerate() {
         let (x, first) = (0.02 * i as f64, 4 * i);
@@ -126,8 +122,8 @@ fn pile(folder: &Path, dissolved: &[f64]) {
             obj += &format!("f {a} {b} {c}\n");
         }
     }
-    std::fs::write(folder.join("pile.obj"), obj).unwrap();
-    std::fs::write(folder.join("pile.mtl"), mtl).unwrap();
+    folder.write("pile.obj", obj);
+    folder.write("pile.mtl", mtl);
 }
 
 /// Opacity and corners of all that is drawn, in some order.
@@ -147,8 +143,7 @@ fn drawn(scene: &BuiltScene) -> Vec<(f32, Vec<Point3<f64>>)> {
 
 #[test]
 fn parts_of_another_opacity_are_drawn_beside_their_body() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = Folder::new();
     let held = format!("{HELD}shape = {{ mesh = \"pile.obj\" }}\n");
     for dissolved in [
         vec![1.0, 1.0, 1.0],
@@ -157,8 +152,8 @@ fn parts_of_another_opacity_are_drawn_beside_their_body() {
         vec![0.5, 1.0, 0.25, 0.75, 0.5],
         vec![0.0, 1.0],
     ] {
-        pile(folder, &dissolved);
-        let scene = built(&held, folder);
+        pile(&folder, &dissolved);
+        let scene = folder.build(&held).unwrap();
         let mut kinds = dissolved.clone();
         kinds.sort_by(f64::total_cmp);
         kinds.dedup();
@@ -180,59 +175,54 @@ fn parts_of_another_opacity_are_drawn_beside_their_body() {
             .all(|it| it.by == Carrier::GodObject && it.pose == Pose::identity());
         assert!(by && scene.carried.len() == scene.scenery.len());
         // What the scene says counts for all.
-        let one = built(&format!("{held}opacity = 0.75\n"), folder);
+        let one = folder.build(&format!("{held}opacity = 0.75\n")).unwrap();
         assert!(one.scenery.is_empty() && one.bodies[0].appearance.opacity == Some(0.75));
         // An import says the same.
-        let made = folder.join("made");
-        let report = import(&ImportRequest {
-            parts: vec![folder.join("pile.obj").into()],
-            folder: made.clone(),
+        let request = ImportRequest {
             unit: "m".parse().ok(),
-            ..Default::default()
-        });
-        let report = report.unwrap().to_string();
+            ..folder.request(&["pile.obj"])
+        };
+        let report = import(&request).unwrap();
+        let imported = crate::support::built(&report.scene);
+        let report = report.to_string();
         assert!(
             !report.contains("opacity") || dissolved.contains(&0.0),
             "{report}"
         );
-        let imported = Scene::load(&made.join("scene.toml"))
-            .and_then(|scene| scene.build())
-            .unwrap();
         let opacities = |all: &[(f32, Vec<Point3<f64>>)]| -> Vec<f32> {
             let mut all: Vec<f32> = all.iter().map(|(opacity, _)| *opacity).collect();
             all.sort_by(f32::total_cmp);
             all
         };
         assert_eq!(opacities(&drawn(&imported)), opacities(&all));
-        std::fs::remove_dir_all(made).unwrap();
+        std::fs::remove_dir_all(request.folder).unwrap();
     }
 }
 
 #[test]
 fn a_body_of_many_opacities_keeps_those_of_its_largest_parts() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let dissolved: Vec<f64> = (1..=9).map(|i| 0.1 * f64::from(i)).collect();
-    pile(folder.path(), &dissolved);
+    pile(&folder, &dissolved);
     let held = format!("{HELD}shape = {{ mesh = \"pile.obj\" }}\n");
-    let scene = built(&held, folder.path());
+    let scene = folder.build(&held).unwrap();
     assert_eq!(scene.scenery.len(), 3);
     assert_eq!(drawn(&scene).len(), 36, "nothing is lost");
 }
 
 #[test]
 fn parts_of_obstacles_go_where_these_go_and_names_stay_unique() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    pile(folder, &[1.0, 0.5]);
+    let folder = Folder::new();
+    pile(&folder, &[1.0, 0.5]);
     let trace = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.1,1,0,0,0\n1,0,0,0.2,1,0,0,0\n";
-    std::fs::write(folder.join("up.csv"), trace).unwrap();
+    folder.write("up.csv", trace);
     let text = format!(
         "{HELD}{BALL}pose = {{ position = [0.0, 0.0, 0.5] }}\n\
          [[obstacle]]\nname = \"stands\"\nshape = {{ mesh = \"pile.obj\" }}\npose = {{ position = [0.0, 0.1, 0.0] }}\n\
          [[obstacle]]\nname = \"rises\"\nshape = {{ mesh = \"pile.obj\" }}\nmotion = {{ trace = \"up.csv\" }}\n\
          [[scenery]]\nname = \"seen\"\nshape = {{ mesh = \"pile.obj\" }}\ncarried_by = \"device\"\n"
     );
-    let scene = built(&text, folder);
+    let scene = folder.build(&text).unwrap();
     let names: Vec<&str> = scene
         .scenery
         .iter()

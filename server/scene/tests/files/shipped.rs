@@ -6,6 +6,8 @@ use taut_scene::{
     DeviceTrace, HandPreset, SHIPPED_SCENES, SHIPPED_WORKBENCH, Scene, Workbench, check, data_file,
 };
 
+use crate::support::assert_says;
+
 /// Tables of a workbench file, with a key that none of them knows. Those of `[device]` hang on its kind: docs/devices.md.
 const UNKNOWN: [&str; 21] = [
     "qqqqqq=1",
@@ -99,11 +101,9 @@ fn the_bunnies_load_or_say_how_to_get_them() {
     );
     if data_file("bunny_27k.ply").is_none() {
         let text = scene.build().unwrap_err().to_string();
-        assert!(
-            text.contains(
-                "run scripts/get-bunny, or name the directory that holds it in TAUT_DATA"
-            ),
-            "{text}"
+        assert_says(
+            &text,
+            "run scripts/get-bunny, or name the directory that holds it in TAUT_DATA",
         );
         taut_test_kit::left_out("bunny_27k.ply is not in the data directory");
         return;

@@ -1,19 +1,17 @@
 //! Meshes with no more triangles than a scene needs: closed, not through themselves, and as near as is said.
 
-use std::path::PathBuf;
-
 use god_object::Mesh;
 use god_object::geometry::{nearest_on_mesh, one_sided_distance, self_intersection};
 use nalgebra::{Point3, Vector3};
 use taut_scene::shapes::{Axis, capsule, cuboid, sphere};
-use taut_scene::{BuiltScene, RawMesh, Scene, check, data_file, write_ply};
+use taut_scene::{BuiltScene, RawMesh, data_file, write_ply};
+
+use crate::support::{Folder, assert_says, joined, quartered};
 
 fn built(mesh: &RawMesh, max_error: f64) -> BuiltScene {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("a.ply"), write_ply(mesh)).unwrap();
-    Scene::parse("s.toml", &text(max_error), folder.path())
-        .and_then(|scene| scene.build())
-        .unwrap()
+    let folder = Folder::new();
+    folder.write("a.ply", write_ply(mesh));
+    folder.build(&text(max_error)).unwrap()
 }
 
 fn text(max_error: f64) -> String {
@@ -160,22 +158,20 @@ fn distances_between_surfaces_have_their_closed_form() {
     assert!((nearest.distance - 0.05).abs() < 1e-15);
 }
 
+/// Two cubes, the second so far from the first.
+fn pair(half: f64, way: Vector3<f64>) -> Mesh {
+    let mut other = cuboid([half; 3]);
+    other.vertices.iter_mut().for_each(|v| *v += way);
+    mesh(&joined([cuboid([half; 3]), other]))
+}
+
 #[test]
 fn surfaces_that_run_through_themselves_are_found() {
-    let mut two = cuboid([0.1; 3]);
-    assert_eq!(self_intersection(&mesh(&two)), None);
-    let other = cuboid([0.1; 3]);
-    let offset = two.vertices.len() as u32;
-    two.vertices.extend(
-        other
-            .vertices
-            .iter()
-            .map(|v| v + Vector3::new(0.15, 0.03, 0.02)),
-    );
-    two.triangles
-        .extend(other.triangles.iter().map(|t| t.map(|i| i + offset)));
-    assert!(self_intersection(&mesh(&two)).is_some());
-    assert_eq!(self_intersection(&mesh(&sphere(0.1, 3))), None);
+    for sound in [cuboid([0.1; 3]), sphere(0.1, 3)] {
+        assert_eq!(self_intersection(&mesh(&sound)), None);
+    }
+    let two = pair(0.1, Vector3::new(0.15, 0.03, 0.02));
+    assert!(self_intersection(&two).is_some());
 }
 
 #[test]
@@ -183,16 +179,14 @@ fn what_cannot_be_simplified_is_used_as_it_is_and_said() {
     let scene = built(&cuboid([0.1; 3]), 1e-6);
     let report = &scene.simplified[0];
     assert_eq!((report.triangles_after, report.to_original), (12, 0.0));
-    assert!(report.to_string().contains("not simplified"), "{report}");
+    assert_says(&report, "not simplified");
 }
 
 #[test]
 fn the_check_prints_triangles_and_distance() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("a.ply"), write_ply(&sphere(0.05, 4))).unwrap();
-    let path: PathBuf = folder.path().join("s.toml");
-    std::fs::write(&path, text(2e-4)).unwrap();
-    let report = check(&[path]).remove(0);
+    let folder = Folder::new();
+    folder.write("a.ply", write_ply(&sphere(0.05, 4)));
+    let report = folder.check("s.toml", text(2e-4));
     assert!(report.is_good(), "{report}");
     assert!(
         report.summary.contains("a: simplified from 5120 to ")
@@ -219,51 +213,18 @@ fn the_bunny_keeps_its_form_with_fewer_triangles() {
     );
 }
 
-/// Each triangle cut into four, so often.
-fn cut(mut raw: RawMesh, times: u32) -> RawMesh {
-    for _ in 0..times {
-        let mut middles = std::collections::HashMap::new();
-        let (mut vertices, mut triangles) = (raw.vertices.clone(), Vec::new());
-        for [a, b, c] in raw.triangles {
-            let mut middle = |i: u32, j: u32| {
-                *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
-                    let (p, q) = (vertices[i as usize], vertices[j as usize]);
-                    vertices.push(nalgebra::center(&p, &q));
-                    vertices.len() as u32 - 1
-                })
-            };
-            let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
-            triangles.extend([[a, d, f], [d, b, e], [f, e, c], [d, e, f]]);
-        }
-        raw = RawMesh {
-            vertices,
-            triangles,
-        };
-    }
-    raw
-}
-
 #[test]
 fn faces_in_one_plane_to_rounding_do_not_run_through_themselves() {
     let turn = nalgebra::UnitQuaternion::from_euler_angles(0.7, 0.3, 0.2);
-    let mut raw = cut(cuboid([0.03, 0.02, 0.01]), 4);
+    let mut raw = quartered(cuboid([0.03, 0.02, 0.01]), 4);
     raw.vertices.iter_mut().for_each(|v| *v = turn * *v);
     assert_eq!(self_intersection(&mesh(&raw)), None);
 }
 
 #[test]
 fn solids_that_touch_at_an_edge_or_a_vertex_do_not_run_through_each_other() {
-    let pair = |way: Vector3<f64>| {
-        let (mut two, other) = (cuboid([0.01; 3]), cuboid([0.01; 3]));
-        let first = two.vertices.len() as u32;
-        two.vertices.extend(other.vertices.iter().map(|p| p + way));
-        two.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|v| v + first)));
-        self_intersection(&mesh(&two))
-    };
-    assert_eq!(pair(Vector3::new(0.02, 0.02, 0.0)), None);
-    assert_eq!(pair(Vector3::new(0.02, 0.02, 0.02)), None);
+    let meet = |way: [f64; 3]| self_intersection(&pair(0.01, way.into())).is_some();
+    assert!(!meet([0.02, 0.02, 0.0]) && !meet([0.02; 3]));
     // With an edge in common, but one in the other.
-    assert!(pair(Vector3::new(0.01, 0.01, 0.0)).is_some());
-    assert!(pair(Vector3::new(0.02, 0.01, 0.0)).is_some());
+    assert!(meet([0.01, 0.01, 0.0]) && meet([0.02, 0.01, 0.0]));
 }

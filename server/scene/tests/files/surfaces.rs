@@ -1,11 +1,12 @@
 //! `check` tells surfaces that are felt as they are meant from those that are not.
 
-use super::checks::Folder;
 use god_object::geometry::self_contact;
 use god_object::{Mesh, geometry::one_sided_distance};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use taut_scene::shapes::{cuboid, sphere};
-use taut_scene::{FileReport, ImportRequest, RawMesh, check, import, write_ply};
+use taut_scene::{FileReport, ImportRequest, RawMesh, import, write_ply};
+
+use crate::support::{Folder, assert_says, joined};
 
 /// Numbers between 0 and 1, the same every time.
 struct Numbers(u64);
@@ -25,10 +26,7 @@ impl Numbers {
 }
 
 fn checked(mesh: &RawMesh) -> FileReport {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.ply");
-    std::fs::write(&path, write_ply(mesh)).unwrap();
-    check(&[path]).remove(0)
+    Folder::new().check("a.ply", write_ply(mesh))
 }
 
 fn placed(mut mesh: RawMesh, turn: UnitQuaternion<f64>, way: Vector3<f64>) -> RawMesh {
@@ -39,18 +37,6 @@ fn placed(mut mesh: RawMesh, turn: UnitQuaternion<f64>, way: Vector3<f64>) -> Ra
 fn turned(mut mesh: RawMesh) -> RawMesh {
     mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     mesh
-}
-
-fn joined(parts: impl IntoIterator<Item = RawMesh>) -> RawMesh {
-    let mut all = RawMesh::default();
-    for part in parts {
-        let first = all.vertices.len() as u32;
-        all.vertices.extend(part.vertices);
-        let triangles = part.triangles.into_iter();
-        all.triangles
-            .extend(triangles.map(|t| t.map(|v| v + first)));
-    }
-    all
 }
 
 /// A prism over a figure of eight; the second lobe is inside out, and smaller.
@@ -112,20 +98,14 @@ fn a_lobe_that_is_inside_out_is_a_fault_with_its_place() {
             report.problems.len() == 1 && told.contains("is inside out beside it"),
             "{case}: {report}"
         );
-        let folder = tempfile::tempdir().unwrap();
-        let part = folder.path().join("a.ply");
-        std::fs::write(&part, write_ply(&mesh)).unwrap();
+        let folder = Folder::new();
+        folder.write("a.ply", write_ply(&mesh));
         let request = ImportRequest {
-            parts: vec![part.into()],
-            folder: folder.path().join("out"),
             obstacles_only: true,
-            ..ImportRequest::default()
+            ..folder.request(&["a.ply"])
         };
         let refused = import(&request).unwrap_err();
-        assert!(
-            refused.to_string().contains("is inside out beside it"),
-            "{refused}"
-        );
+        assert_says(&refused, "is inside out beside it");
         assert!(!request.folder.exists());
     }
 }
@@ -275,9 +255,9 @@ fn a_touch_without_a_crossing_is_no_inverted_lobe() {
 #[test]
 fn what_is_judged_of_a_body_is_what_is_felt_and_not_what_is_drawn() {
     let folder = Folder::new();
-    folder.file("eight.ply", write_ply(&eight([0.03, 0.02], 8, 2, 0.05)));
-    folder.file("box.ply", write_ply(&cuboid([0.02, 0.02, 0.02])));
-    folder.file("sheet.obj", "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nf 1 2 3\n");
+    folder.write("eight.ply", write_ply(&eight([0.03, 0.02], 8, 2, 0.05)));
+    folder.write("box.ply", write_ply(&cuboid([0.02, 0.02, 0.02])));
+    folder.write("sheet.obj", "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nf 1 2 3\n");
     let scene = |felt: &str, drawn: &str| {
         format!(
             "name = \"a\"\n[god_object]\nmass = 1.0\nshape = {{ sphere = {{ radius = 0.01 }} }}\n\
@@ -288,10 +268,10 @@ fn what_is_judged_of_a_body_is_what_is_felt_and_not_what_is_drawn() {
     for drawn in ["sheet.obj", "eight.ply"] {
         let report = folder.check("good.toml", scene("box.ply", drawn));
         assert!(report.is_good(), "{report}");
-        assert!(report.to_string().contains("part 12"), "{report}");
+        assert_says(&report, "part 12");
     }
     let report = folder.check("bad.toml", scene("eight.ply", "box.ply"));
-    assert!(report.to_string().contains("inside out"), "{report}");
+    assert_says(&report, "inside out");
     // The same where the scene has another fault.
     let faulty = scene("eight.ply", "none.obj") + "speed = 1\n";
     let all = folder.check("faulty.toml", faulty).to_string();

@@ -1,11 +1,13 @@
 //! Pictures on surfaces: read from glTF and OBJ files, kept by an import, said where they are lost.
 
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
 
 use image::{ImageFormat, Rgba, RgbaImage};
 use taut_proto::Wrap;
-use taut_scene::{BodyTextures, BuiltBody, BuiltScene, ImportPart, ImportRequest, Scene, import};
+use taut_scene::{BodyTextures, BuiltBody, ImportPart, ImportRequest, import};
+use taut_test_kit::base64;
+
+use crate::support::{Folder, built};
 
 /// Red, green, blue and yellow, from the upper left on, row by row.
 const COLOURS: [[u8; 4]; 4] = [
@@ -28,20 +30,6 @@ fn png(picture: &RgbaImage) -> Vec<u8> {
     bytes.into_inner()
 }
 
-fn base64(bytes: &[u8]) -> String {
-    let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::new();
-    for chunk in bytes.chunks(3) {
-        let mut word = [0; 3];
-        word[..chunk.len()].copy_from_slice(chunk);
-        let bits = u32::from_be_bytes([0, word[0], word[1], word[2]]);
-        for i in 0..=chunk.len() {
-            text.push(char::from(alphabet[(bits >> (18 - 6 * i)) as usize & 63]));
-        }
-    }
-    text
-}
-
 /// Where the picture of a glTF file is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum At {
@@ -50,24 +38,9 @@ enum At {
     File,
 }
 
-struct Folder(tempfile::TempDir);
-
 impl Folder {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
-        std::fs::write(self.path(name), content).unwrap();
-        self.path(name)
-    }
-
     /// A tetrahedron whose face (0, 1, 2) has the picture's upper left half; `texture` and `material` have more of their keys.
-    fn gltf(&self, name: &str, at: At, picture: &[u8], texture: &str, material: &str) -> PathBuf {
+    fn gltf(&self, name: &str, at: At, picture: &[u8], texture: &str, material: &str) {
         let mut bytes = Vec::new();
         for index in [0_u16, 1, 2, 0, 3, 1, 1, 3, 2, 2, 3, 0] {
             bytes.extend(index.to_le_bytes());
@@ -107,32 +80,28 @@ impl Folder {
             bytes.len(),
             picture.len(),
         );
-        self.write(name, text)
-    }
-
-    fn built(&self, held: &str) -> BuiltScene {
-        let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{held}\n");
-        let scene = Scene::parse("s.toml", &text, self.0.path());
-        scene.and_then(|scene| scene.build()).unwrap()
+        self.write(name, text);
     }
 
     fn body(&self, file: &str) -> (BuiltBody, Vec<String>) {
-        let mut built = self.built(&format!("shape = {{ mesh = \"{file}\" }}"));
+        let mut built = self.holding(&format!("shape = {{ mesh = \"{file}\" }}"), "");
         (built.bodies.remove(0), built.lost_looks)
     }
 
-    fn imported(&self, part: PathBuf) -> (BuiltBody, Vec<String>, String) {
-        let folder = self.path("made");
+    fn imported(&self, part: &str) -> (BuiltBody, Vec<String>, String) {
         let report = import(&ImportRequest {
-            parts: vec![part.into()],
-            folder: folder.clone(),
-            unit: Some("m".parse().unwrap()),
-            ..ImportRequest::default()
+            unit: "m".parse().ok(),
+            ..self.request(&[part])
         });
-        let report = report.unwrap().to_string();
-        let built = Scene::load(&folder.join("scene.toml")).and_then(|scene| scene.build());
-        let mut built = built.unwrap();
-        (built.bodies.remove(0), built.lost_looks, report)
+        let report = report.unwrap();
+        let mut built = built(&report.scene);
+        let said = report.to_string();
+        (built.bodies.remove(0), built.lost_looks, said)
+    }
+
+    fn body_of_obj(&self) -> (BuiltBody, Vec<String>) {
+        self.write("a.obj", OBJ);
+        self.body("a.obj")
     }
 }
 
@@ -187,7 +156,7 @@ fn a_gltf_picture_is_read_from_wherever_it_is() {
         let folder = Folder::new();
         let picture = png(&board(8, 255));
         folder.write("a picture.png", &picture);
-        let path = folder.gltf("a.gltf", at, &picture, "", "");
+        folder.gltf("a.gltf", at, &picture, "", "");
         let (body, lost) = folder.body("a.gltf");
         assert_eq!(lost, [""; 0], "{at:?}");
         assert_laid(&body);
@@ -201,16 +170,16 @@ fn a_gltf_picture_is_read_from_wherever_it_is() {
         assert!(near, "{mean:?} and not {exact:?}");
         // What belongs to the scene is known to who watches or packs it.
         let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { mesh = \"a.gltf\" }\n";
-        let scene = Scene::parse("s.toml", text, folder.0.path()).unwrap();
+        let scene = folder.parse(text).unwrap();
         let names: Vec<String> = scene.files().unwrap().into_iter().map(|(n, _)| n).collect();
         assert_eq!(names.contains(&"a picture.png".to_owned()), at == At::File);
 
-        let (seen, lost, report) = folder.imported(path);
+        let (seen, lost, report) = folder.imported("a.gltf");
         assert_eq!(lost, [""; 0]);
         assert!(!report.contains("not drawn"), "{report}");
         assert_laid(&seen);
         assert_eq!(textures(&seen).list[0].wrap, [Wrap::Mirror, Wrap::Clamp]);
-        let kept = std::fs::read(folder.path("made/a-visual-1.png")).unwrap();
+        let kept = std::fs::read(folder.path("out/a-visual-1.png")).unwrap();
         assert_eq!(kept, picture, "the file itself");
     }
 }
@@ -235,16 +204,14 @@ fn a_body_of_several_files_has_the_pictures_of_each() {
         body: Some("one".to_owned()),
         ..folder.path(name).into()
     };
-    let made = folder.path("made");
     let report = import(&ImportRequest {
         parts: ["a.gltf", "b.obj", "c.obj"].map(of_one).into(),
-        folder: made.clone(),
-        unit: Some("m".parse().unwrap()),
-        ..ImportRequest::default()
+        unit: "m".parse().ok(),
+        ..folder.request(&[])
     });
-    assert!(!report.unwrap().to_string().contains("not drawn"));
-    let built = Scene::load(&made.join("scene.toml")).and_then(|scene| scene.build());
-    let built = built.unwrap();
+    let report = report.unwrap();
+    assert!(!report.to_string().contains("not drawn"));
+    let built = built(&report.scene);
     assert_eq!(built.lost_looks, [""; 0]);
     let body = &built.bodies[0];
     assert_eq!(body.mesh.triangles.len(), 12);
@@ -294,8 +261,8 @@ fn opacity_counts_where_the_material_blends_or_has_holes() {
     assert_eq!(opacity(blend), (64, Some(1.0), vec![]));
     assert_eq!(opacity(",\"alphaMode\":\"MASK\""), (64, None, vec![]));
     // An import says so in its library, which is read again.
-    let path = folder.gltf("b.gltf", At::Uri, &picture, "", blend);
-    let (body, _, _) = folder.imported(path);
+    folder.gltf("b.gltf", At::Uri, &picture, "", blend);
+    let (body, _, _) = folder.imported("b.gltf");
     assert_eq!(seen(&body, [0.1, 0.1])[3], 64);
 }
 
@@ -312,8 +279,7 @@ fn an_obj_picture_is_read_beside_its_library_and_runs_up() {
         let library =
             format!("newmtl wood\nKd 0.5 0.5 0.5\nmap_Kd {option}{name}\nnewmtl steel\nKd 1 0 0\n");
         folder.write("a.mtl", library);
-        let path = folder.write("a.obj", OBJ);
-        let (body, lost) = folder.body("a.obj");
+        let (body, lost) = folder.body_of_obj();
         assert_eq!(lost, [""; 0]);
         assert_laid(&body);
         assert_eq!(
@@ -324,7 +290,7 @@ fn an_obj_picture_is_read_beside_its_library_and_runs_up() {
         // Kd is a factor, from sRGB.
         let [factor, ..] = body.looks[0].0.color.unwrap();
         assert!((factor - 0.214).abs() < 1e-3, "{factor}");
-        let (seen, lost, _) = folder.imported(path);
+        let (seen, lost, _) = folder.imported("a.obj");
         assert_eq!(lost, [""; 0]);
         assert_laid(&seen);
         assert_eq!(textures(&seen).of_looks, [Some(0), None]);
@@ -344,16 +310,9 @@ fn a_jpeg_is_read_by_what_it_holds_and_kept_as_it_is() {
     let (body, _) = folder.body_of_obj();
     let [red, green, blue, _] = seen(&body, [0.1, 0.1]);
     assert!(red > 240 && green < 16 && blue < 16, "{red} {green} {blue}");
-    let (again, _, _) = folder.imported(folder.path("a.obj"));
+    let (again, _, _) = folder.imported("a.obj");
     assert_eq!(textures(&again).list[0].hash, textures(&body).list[0].hash);
-    assert!(folder.path("made/a-visual-1.jpg").is_file());
-}
-
-impl Folder {
-    fn body_of_obj(&self) -> (BuiltBody, Vec<String>) {
-        self.write("a.obj", OBJ);
-        self.body("a.obj")
-    }
+    assert!(folder.path("out/a-visual-1.jpg").is_file());
 }
 
 #[test]
@@ -412,7 +371,10 @@ fn where_other_triangles_are_drawn_the_mean_colour_goes_on() {
         text += &format!("f {a}/1 {b}/1 {c}/1\n");
     }
     folder.write("c.obj", text);
-    let built = folder.built("shape = { mesh = \"c.obj\", simplify = { max_error = 0.001 } }");
+    let built = folder.holding(
+        "shape = { mesh = \"c.obj\", simplify = { max_error = 0.001 } }",
+        "",
+    );
     let body = &built.bodies[0];
     assert!(body.textures.is_none() && body.mesh.triangles.len() < cube.triangles.len());
     let [red, green, _] = body.appearance.color.unwrap();
@@ -424,9 +386,9 @@ fn where_other_triangles_are_drawn_the_mean_colour_goes_on() {
     );
     // As it says, the same file as what is drawn shows them; a colour of the scene counts before any picture.
     let held = "shape = { mesh = \"c.obj\", simplify = { max_error = 0.001 } }\nvisual = { mesh = \"c.obj\" }";
-    let built = folder.built(held);
+    let built = folder.holding(held, "");
     assert!(built.bodies[0].textures.is_some() && built.lost_looks.is_empty());
-    let built = folder.built(&format!("{held}\ncolor = \"red\""));
+    let built = folder.holding(&format!("{held}\ncolor = \"red\""), "");
     assert!(built.bodies[0].textures.is_none() && built.lost_looks.is_empty());
 }
 
@@ -443,9 +405,8 @@ fn pieces_keep_their_places_in_the_picture() {
     let rest = rest.replace("1/1 2/2 3/3", "5/1 6/2 7/3");
     let rest = rest.replace("f 1 4 2\nf 2 4 3\nf 3 4 1", "f 5 8 6\nf 6 8 7\nf 7 8 5");
     folder.write("a.obj", format!("{head}{other}v 0 0 0{rest}"));
-    let built = folder.built("shape = { mesh = \"a.obj\", only = [\"wanted\"] }");
+    let built = folder.holding("shape = { mesh = \"a.obj\", only = [\"wanted\"] }", "");
     let body = &built.bodies[0];
     assert_eq!(body.mesh.triangles.len(), 4);
     assert_laid(body);
-    assert!(Path::new(&folder.path("b.png")).is_file());
 }

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use taut_scene::{Device, HandPreset, SHIPPED_WORKBENCH, Workbench};
 
+use crate::support::assert_says;
+
 fn line_of(text: &str, wanted: &str) -> usize {
     1 + text
         .lines()
@@ -293,10 +295,7 @@ fn multicast_leaves_from_the_interface_that_is_listened_on_or_named() {
 
     let everywhere = ["network.transport=multicast", "network.bind=0.0.0.0"];
     let found = parse(&everywhere).unwrap_err().to_string();
-    assert!(
-        found.contains("does not say from which interface multicast leaves"),
-        "{found}"
-    );
+    assert_says(&found, "does not say from which interface multicast leaves");
     let named = [
         everywhere[0],
         everywhere[1],

@@ -6,6 +6,8 @@ use nalgebra::Vector3;
 use taut_kinds::{Chosen, KINDS, KindId, Takes};
 use taut_scene::{Device, HeadTracking, NeededFile, SHIPPED_WORKBENCH, Workbench};
 
+use crate::support::assert_says;
+
 fn with_device(keys: &str) -> Result<Workbench, String> {
     let begin = SHIPPED_WORKBENCH.find("[device]").expect("a device");
     let end = SHIPPED_WORKBENCH.find("[network]").expect("a network");
@@ -142,9 +144,9 @@ fn a_head_tracker_takes_the_place_of_the_sway() {
     assert_eq!(address.device, "Head");
     let anchored = with_viewer(sway, &tracker.replace("axes", "anchor = \"start\", axes"));
     let error = anchored.expect_err("a head is where it is");
-    assert!(error.contains("unknown key `anchor`"), "{error}");
+    assert_says(&error, "unknown key `anchor`");
     let error = with_viewer(sway, &format!("{sway}\n{tracker}")).expect_err("both");
-    assert!(error.contains("exclude each other"), "{error}");
+    assert_says(&error, "exclude each other");
 }
 
 #[test]
@@ -222,7 +224,7 @@ fn a_tracker_on_the_network_takes_the_place_of_the_sway() {
         HeadTracking::Sway { .. }
     ));
     let error = with_viewer(sway, &format!("{sway}\nremote_tracker = true")).expect_err("both");
-    assert!(error.contains("excludes"), "{error}");
+    assert_says(&error, "excludes");
 }
 
 fn with_admission(keys: &str) -> Result<Workbench, String> {
@@ -281,13 +283,13 @@ fn a_second_cluster_key_needs_its_time_and_both_are_read() {
         ),
     ] {
         let error = with(keys).expect_err(keys);
-        assert!(error.contains(says), "{error}");
+        assert_says(&error, says);
     }
 }
 
 #[test]
 fn a_house_that_is_too_small_for_the_workbench_is_a_fault() {
     let error = with_admission("max_clients = 4").expect_err("two nodes and three others");
-    assert!(error.contains("write 5 or more"), "{error}");
+    assert_says(&error, "write 5 or more");
     assert!(with_admission("max_clients = 5").is_ok());
 }

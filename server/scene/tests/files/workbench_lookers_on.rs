@@ -5,6 +5,8 @@ use std::path::Path;
 
 use taut_scene::{NeededFile, SHIPPED_WORKBENCH, Workbench};
 
+use crate::support::assert_says;
+
 fn with(assignments: &[&str]) -> Result<Workbench, String> {
     Workbench::parse_with_overrides("w.toml", SHIPPED_WORKBENCH, Path::new(""), assignments)
         .map_err(|error| error.to_string())
@@ -81,7 +83,7 @@ fn slips_are_refused_with_what_to_do() {
         (&["operator.port=70000"], "`port`"),
     ] {
         let found = with(assignments).expect_err(wanted);
-        assert!(found.contains(wanted), "{found}");
+        assert_says(&found, wanted);
     }
 }
 
@@ -91,7 +93,7 @@ fn no_rate_is_so_slow_that_its_period_is_no_time() {
         for rate in ["1e-300", "5e-20", "0.99"] {
             let found = with(&[&format!("{table}.rate={rate}")]).expect_err(rate);
             for wanted in ["`rate`", table, "between 1 and"] {
-                assert!(found.contains(wanted), "{found}");
+                assert_says(&found, wanted);
             }
         }
         with(&[&format!("{table}.rate=1")]).expect("the slowest");
@@ -122,7 +124,7 @@ fn a_token_is_read_from_its_file_and_a_poor_one_is_refused() {
     assert_eq!(operator.token(), Ok(Some("0123456789abcdef_-".to_owned())));
     std::fs::write(&path, "short\n").expect("written");
     let refused = operator.token().expect_err("short");
-    assert!(refused.contains("[operator]"), "{refused}");
+    assert_says(&refused, "[operator]");
 }
 
 #[test]

@@ -5,6 +5,8 @@ use std::path::Path;
 
 use taut_scene::{NeededFile, SHIPPED_WORKBENCH, ScreenOutput, Workbench, check};
 
+use crate::support::assert_says;
+
 const KEYS: &str = "upper_left = [-0.9, 0.0, 1.2]\n";
 
 /// The shipped workbench with these lines in its first screen.
@@ -141,7 +143,7 @@ fn stereo_that_cannot_show_the_correction_is_refused_by_name() {
         1,
     );
     let fault = parsed(&mixed).expect_err("anaglyph");
-    assert!(fault.contains("mixes the colours of both eyes"), "{fault}");
+    assert_says(&fault, "mixes the colours of both eyes");
 }
 
 #[test]

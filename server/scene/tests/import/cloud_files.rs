@@ -9,6 +9,7 @@ use super::clouds::{import_as, judge_shell, on_ball, random};
 use super::judge::judge;
 use super::solids::{Point, moved, part, sheet};
 use super::write::{obj_soup, ply, ply_points};
+use crate::support::{Folder, assert_says};
 
 #[test]
 fn points_of_every_format_and_unit_give_the_same_shell() {
@@ -97,16 +98,13 @@ fn what_is_no_cloud_or_cannot_be_a_shell_is_refused_with_what_to_do() {
     let error = import_as("a.ply", &ply_points(&far), Some(2e-3), Some("m"))
         .unwrap_err()
         .to_string();
-    assert!(
-        error.contains("move them near to the origin in double precision"),
-        "{error}"
-    );
+    assert_says(&error, "move them near to the origin in double precision");
 }
 
 /// A file of a sheet, one of a scan, one of a solid: one body.
 #[test]
 fn a_scan_is_joined_with_meshes_in_one_body() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let scan = random(1500, |p| on_ball(p, 0.01).map(|c| c + 0.1));
     let files: [(&str, Vec<u8>); 3] = [
         (
@@ -122,18 +120,14 @@ fn a_scan_is_joined_with_meshes_in_one_body() {
             ply(&moved(sheet([0.06, 0.04], [3, 2]), [0.1, 0.0, 0.0])),
         ),
     ];
-    let parts = files.map(|(name, bytes)| {
-        std::fs::write(folder.path().join(name), bytes).unwrap();
-        taut_scene::ImportPart {
-            body: Some("all".into()),
-            ..folder.path().join(name).into()
-        }
+    let parts = files.map(|(name, bytes)| taut_scene::ImportPart {
+        body: Some("all".into()),
+        ..folder.write(name, bytes).into()
     });
     let report = import(&ImportRequest {
         parts: parts.into(),
-        folder: folder.path().join("out"),
         thicken: Some(5e-3),
-        ..ImportRequest::default()
+        ..folder.request(&[])
     });
     let report = report.unwrap();
     let verdict = judge(&Path::new(&report.folder).join(&report.parts[0].mesh_file));

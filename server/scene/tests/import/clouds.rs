@@ -7,6 +7,7 @@ use taut_scene::{FileError, ImportReport, ImportRequest, import};
 use super::judge::{Verdict, judge, winding};
 use super::solids::{Noise, Point, Triangle};
 use super::write::ply_points;
+use crate::support::{Folder, assert_says};
 
 pub(super) fn import_as(
     name: &str,
@@ -14,15 +15,12 @@ pub(super) fn import_as(
     thicken: Option<f64>,
     unit: Option<&str>,
 ) -> Result<(ImportReport, Verdict), FileError> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(name);
-    std::fs::write(&path, bytes).unwrap();
+    let folder = Folder::new();
+    folder.write(name, bytes);
     let report = import(&ImportRequest {
-        parts: vec![path.into()],
-        folder: folder.path().join("out"),
         unit: unit.map(|unit| unit.parse().unwrap()),
         thicken,
-        ..ImportRequest::default()
+        ..folder.request(&[name])
     })?;
     let verdict = judge(&Path::new(&report.folder).join(&report.parts[0].mesh_file));
     Ok((report, verdict))
@@ -279,9 +277,9 @@ fn gaps_between_points_that_go_through_are_counted() {
     for (cloud, gaps) in [(&ring, 1), (&holed, 6)] {
         let (report, _) = import_as("a.ply", &ply_points(cloud), Some(1.6e-3), Some("m")).unwrap();
         let told = report.to_string();
-        assert!(
-            told.contains(&format!("; {gaps} gaps between points go through it")),
-            "{told}"
+        assert_says(
+            &told,
+            &format!("; {gaps} gaps between points go through it"),
         );
     }
     // Thicker, they are closed.

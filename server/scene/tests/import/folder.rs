@@ -1,59 +1,37 @@
 //! What an import writes: a folder that can be used at once, or nothing.
 
-use std::path::{Path, PathBuf};
-
-use god_object::nalgebra::Point3;
+use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, linear};
 use god_object::{Coupling, GodObject};
-use taut_scene::{ImportRequest, Scene, UpAxis, check, import, import_unless};
+use taut_scene::{ImportRequest, UpAxis, check, import, import_unless};
 
 use super::solids::{Soup, moved, part, scaled};
 use super::write::{glb, ply, stl};
+use crate::support::{Folder, assert_says, built};
 
-struct Parts(tempfile::TempDir);
-
-impl Parts {
-    fn new(files: &[(&str, &Soup)]) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        for (name, soup) in files {
-            std::fs::write(folder.path().join(name), ply(soup)).unwrap();
-        }
-        Self(folder)
+fn parts(files: &[(&str, &Soup)]) -> Folder {
+    let folder = Folder::new();
+    for (name, soup) in files {
+        folder.write(name, ply(soup));
     }
-
-    fn request(&self, names: &[&str]) -> ImportRequest {
-        ImportRequest {
-            parts: names.iter().map(|name| self.path(name).into()).collect(),
-            folder: self.path("out"),
-            ..ImportRequest::default()
-        }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn entries(&self) -> usize {
-        std::fs::read_dir(self.0.path()).unwrap().count()
-    }
+    folder
 }
 
-fn start_of(scene: &Path) -> [f64; 3] {
-    let built = Scene::load(scene).and_then(|scene| scene.build()).unwrap();
-    built.start.translation.vector.into()
+fn entries(folder: &Folder) -> usize {
+    std::fs::read_dir(folder.path("")).unwrap().count()
 }
 
 #[test]
 fn the_scene_passes_the_check_and_keeps_the_places_of_the_parts() {
-    let parts = Parts::new(&[
+    let parts = parts(&[
         ("peg.ply", &part()),
         ("hole.ply", &moved(part(), [0.1, 0.0, 0.0])),
     ]);
     let report = import(&parts.request(&["peg.ply", "hole.ply"])).unwrap();
-    let scene = PathBuf::from(&report.scene);
-    assert!(check(&[&scene])[0].is_good(), "{}", check(&[&scene])[0]);
-    assert_eq!(start_of(&scene), [0.0; 3]);
-    let built = Scene::load(&scene).and_then(|scene| scene.build()).unwrap();
+    let checked = check(&[&report.scene]).remove(0);
+    assert!(checked.is_good(), "{checked}");
+    let built = built(&report.scene);
+    assert_eq!(built.start.translation.vector, Vector3::zeros());
     assert_eq!(built.name, "out");
     let obstacle = &built.bodies[1];
     assert_eq!(obstacle.name, "hole");
@@ -64,34 +42,32 @@ fn the_scene_passes_the_check_and_keeps_the_places_of_the_parts() {
 
 #[test]
 fn a_part_that_touches_the_others_begins_above_them() {
-    let parts = Parts::new(&[
+    let parts = parts(&[
         ("a.ply", &part()),
         ("b.ply", &moved(part(), [0.02, 0.0, 0.0])),
     ]);
     let report = import(&parts.request(&["a.ply", "b.ply"])).unwrap();
-    let start = start_of(Path::new(&report.scene));
-    assert!(start[2] > 0.02, "{start:?}");
+    let start = built(&report.scene).start;
+    assert!(start.translation.z > 0.02, "{start}");
     assert!(report.notes[0].contains("touch or overlap"), "{report}");
 }
 
 #[test]
 fn all_parts_stand_below_a_sphere_where_that_is_asked() {
-    let parts = Parts::new(&[("a.ply", &part())]);
+    let parts = parts(&[("a.ply", &part())]);
     let request = ImportRequest {
         obstacles_only: true,
         ..parts.request(&["a.ply"])
     };
     let report = import(&request).unwrap();
-    let built = Scene::load(Path::new(&report.scene))
-        .and_then(|scene| scene.build())
-        .unwrap();
+    let built = built(&report.scene);
     assert!(built.world.body.primitive.is_some());
     assert_eq!(built.bodies[1].name, "a");
 }
 
 /// Largest force, N, and farthest way behind the hand, in shares of the body's size, along the straight ways between the via points of an imported scene.
-fn felt_on_the_way(scene: &Path) -> [f64; 2] {
-    let built = Scene::load(scene).and_then(|scene| scene.build()).unwrap();
+fn felt_on_the_way(scene: &str) -> [f64; 2] {
+    let built = built(scene);
     let hand = built.hand.as_ref().expect("a hand");
     let via = hand.path.samples();
     let between = |a: &Pose, b: &Pose| (a.translation.vector - b.translation.vector).norm();
@@ -122,7 +98,7 @@ fn a_simulated_hand_meets_what_was_imported() {
         let beside = moved(part(), [0.1, 0.0, 0.0]);
         let on = moved(part(), [0.02, 0.0, 0.0]);
         for (other, obstacles_only) in [(beside, false), (on.clone(), false), (on, true)] {
-            let parts = Parts::new(&[
+            let parts = parts(&[
                 ("a.ply", &scaled(part(), size)),
                 ("b.ply", &scaled(other, size)),
             ]);
@@ -136,7 +112,7 @@ fn a_simulated_hand_meets_what_was_imported() {
                 note.contains("hand.csv") && note.contains("against"),
                 "{note}"
             );
-            let [force, behind] = felt_on_the_way(Path::new(&report.scene));
+            let [force, behind] = felt_on_the_way(&report.scene);
             println!("{size}: {force} N, behind by {behind}");
             assert!((0.1..40.0).contains(&force), "{size}: {force} N");
             assert!((0.005..2.0).contains(&behind), "{size}: {behind}");
@@ -146,28 +122,28 @@ fn a_simulated_hand_meets_what_was_imported() {
 
 #[test]
 fn a_folder_that_exists_is_refused_by_name_and_left_as_it_is() {
-    let parts = Parts::new(&[("a.ply", &part())]);
+    let parts = parts(&[("a.ply", &part())]);
     std::fs::create_dir(parts.path("out")).unwrap();
     let error = import(&parts.request(&["a.ply"])).unwrap_err().to_string();
-    assert!(error.contains("out: exists already"), "{error}");
+    assert_says(&error, "out: exists already");
     assert_eq!(std::fs::read_dir(parts.path("out")).unwrap().count(), 0);
     let nowhere = ImportRequest {
         folder: parts.path("no/such/out"),
         ..parts.request(&["a.ply"])
     };
     let error = import(&nowhere).unwrap_err().to_string();
-    assert!(error.contains("cannot be made"), "{error}");
+    assert_says(&error, "cannot be made");
 }
 
 #[test]
 fn faults_of_all_parts_are_told_at_once_and_nothing_is_left() {
-    let parts = Parts::new(&[("mm.ply", &scaled(part(), 1e3)), ("good.ply", &part())]);
+    let parts = parts(&[("mm.ply", &scaled(part(), 1e3)), ("good.ply", &part())]);
     let request = parts.request(&["mm.ply", "good.ply", "missing.ply"]);
-    let before = parts.entries();
+    let before = entries(&parts);
     let error = import(&request).unwrap_err();
     assert_eq!(error.problems().len(), 2, "{:?}", error.problems());
     assert!(error.problems()[0].file.ends_with("mm.ply"));
-    assert_eq!(parts.entries(), before);
+    assert_eq!(entries(&parts), before);
 }
 
 #[test]
@@ -176,25 +152,25 @@ fn the_report_can_be_copied_and_a_thin_part_has_a_thickness() {
         .into_iter()
         .map(|t| t.map(|[x, y, z]| [x, y, z * 1e-4]))
         .collect();
-    let parts = Parts::new(&[("a.ply", &thin)]);
+    let parts = parts(&[("a.ply", &thin)]);
     let request = ImportRequest {
         folder: parts.path("my part"),
         unit: Some("m".parse().unwrap()),
         ..parts.request(&["a.ply"])
     };
     let text = import(&request).unwrap().to_string();
-    assert!(text.contains("0.0600 x 0.0400 x 2.000e-6 m,"), "{text}");
+    assert_says(&text, "0.0600 x 0.0400 x 2.000e-6 m,");
     assert!(text.ends_with("my part/scene.toml'"), "{text}");
 }
 
 #[test]
 fn an_import_that_is_interrupted_leaves_nothing() {
-    let parts = Parts::new(&[
+    let parts = parts(&[
         ("a.ply", &part()),
         ("b.ply", &moved(part(), [0.1, 0.0, 0.0])),
     ]);
     let request = parts.request(&["a.ply", "b.ply"]);
-    let before = parts.entries();
+    let before = entries(&parts);
     let mut asked = 0;
     for end in 1.. {
         asked = 0;
@@ -210,23 +186,19 @@ fn an_import_that_is_interrupted_leaves_nothing() {
             error.ends_with("out: the import was interrupted; nothing was written"),
             "{error}"
         );
-        assert_eq!(parts.entries(), before);
+        assert_eq!(entries(&parts), before);
     }
     assert!(asked >= 4, "asked {asked} times");
 }
 
 #[test]
 fn names_that_would_be_the_same_are_told_apart() {
-    let parts = Parts::new(&[
+    let parts = parts(&[
         ("a b.ply", &part()),
         ("god-object.ply", &moved(part(), [0.1, 0.0, 0.0])),
     ]);
-    std::fs::write(parts.path("A-B.stl"), stl(&moved(part(), [0.2, 0.0, 0.0]))).unwrap();
-    std::fs::write(
-        parts.path("coupling.ply"),
-        ply(&moved(part(), [0.3, 0.0, 0.0])),
-    )
-    .unwrap();
+    parts.write("A-B.stl", stl(&moved(part(), [0.2, 0.0, 0.0])));
+    parts.write("coupling.ply", ply(&moved(part(), [0.3, 0.0, 0.0])));
     let names = ["a b.ply", "god-object.ply", "A-B.stl", "coupling.ply"];
     let report = import(&parts.request(&names)).unwrap();
     let files: Vec<&str> = report.parts.iter().map(|p| p.mesh_file.as_str()).collect();
@@ -237,9 +209,8 @@ fn names_that_would_be_the_same_are_told_apart() {
 /// From 3 to 7 cm along the y axis of the file.
 #[test]
 fn what_is_up_in_the_files_is_up_in_the_scene_where_that_is_said() {
-    let parts = Parts::new(&[]);
-    let file = glb(&moved(part(), [0.0, 0.05, 0.0]));
-    std::fs::write(parts.path("a.glb"), file).unwrap();
+    let parts = Folder::new();
+    parts.write("a.glb", glb(&moved(part(), [0.0, 0.05, 0.0])));
     let lying = [[-0.03, 0.03, -0.01], [0.03, 0.07, 0.01]];
     let upright = [[-0.03, -0.01, 0.03], [0.03, 0.01, 0.07]];
     for (out, up, expected) in [
@@ -253,8 +224,7 @@ fn what_is_up_in_the_files_is_up_in_the_scene_where_that_is_said() {
             ..parts.request(&["a.glb"])
         };
         let report = import(&request).unwrap();
-        let scene = Scene::load(Path::new(&report.scene)).unwrap();
-        let (low, high) = scene.build().unwrap().bodies[0].mesh.bounds().unwrap();
+        let (low, high) = built(&report.scene).bodies[0].mesh.bounds().unwrap();
         for (corner, meant) in [low, high].into_iter().zip(expected) {
             let off = (corner - Point3::from(meant)).amax();
             assert!(off < 1e-7, "{out}: {corner}");
@@ -268,7 +238,7 @@ fn what_is_up_in_the_files_is_up_in_the_scene_where_that_is_said() {
 #[test]
 fn a_place_is_told_in_metres_of_the_part() {
     let overlapping: Soup = [part(), moved(part(), [0.03, 0.02, 0.01])].concat();
-    let parts = Parts::new(&[("a.ply", &overlapping)]);
+    let parts = parts(&[("a.ply", &overlapping)]);
     let report = import(&parts.request(&["a.ply"])).unwrap();
     let finding = report.parts[0]
         .all_findings()
@@ -281,14 +251,14 @@ fn a_place_is_told_in_metres_of_the_part() {
         on_both(x, 0.03) && on_both(y, 0.02) && on_both(z, 0.01),
         "{finding}"
     );
-    assert!(report.to_string().contains("NOT MENDED"), "{report}");
+    assert_says(&report, "NOT MENDED");
 }
 
 /// A body that begins above them moves the middle by some centimetres.
 #[test]
 fn parts_far_from_the_origin_are_shown_in_the_middle_of_the_workbench() {
     for way in [[0.0; 3], [5.0, -3.0, 2.0], [-0.4, 0.7, -0.2]] {
-        let parts = Parts::new(&[("a.ply", &moved(part(), way))]);
+        let parts = parts(&[("a.ply", &moved(part(), way))]);
         for obstacles_only in [false, true] {
             let request = ImportRequest {
                 obstacles_only,
@@ -296,8 +266,8 @@ fn parts_far_from_the_origin_are_shown_in_the_middle_of_the_workbench() {
                 ..parts.request(&["a.ply"])
             };
             let report = import(&request).unwrap();
-            let scene = Scene::load(Path::new(&report.scene)).unwrap();
-            let (view, built) = (scene.view(), scene.build().unwrap());
+            let built = built(&report.scene);
+            let view = built.view;
             let (origin, body) = (view.origin.unwrap(), usize::from(obstacles_only));
             let (low, high) = built.bodies[body].mesh.bounds().unwrap();
             let seen = [0, 1, 2].map(|k| origin[k] + view.display_scale * 0.5 * (low[k] + high[k]));

@@ -1,47 +1,31 @@
 //! Several files that become one body.
 
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use taut_scene::{BuiltScene, ImportPart, ImportReport, ImportRequest, Scene, UpAxis, import};
+use taut_scene::{ImportPart, ImportReport, ImportRequest, UpAxis, import};
 
 use super::judge::{judge, one_sided};
 use super::solids::{HALF, Noise, Soup, VOLUME, cuboid, flipped, mapped, moved, part, scaled};
 use super::write::{glb, obj_soup, ply, stl};
-
-pub(super) struct Folder(tempfile::TempDir);
+use crate::support::{Folder, assert_says, built};
 
 impl Folder {
-    pub(super) fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    pub(super) fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.path().join(name);
-        std::fs::write(&path, bytes).unwrap();
-        path
-    }
-
     /// Imports words of the command line, all standing, into a folder of this name.
-    pub(super) fn request(&self, words: &[&str], out: &str) -> ImportRequest {
+    pub(super) fn words(&self, words: &[&str], out: &str) -> ImportRequest {
         let named = |word: &&str| {
             let (body, file) = word.split_once('=').unwrap_or(("", word));
-            let path = self.0.path().join(file);
+            let path = self.path(file);
             let equals = if body.is_empty() { "" } else { "=" };
             ImportPart::named(OsStr::new(&format!("{body}{equals}{}", path.display())))
         };
         ImportRequest {
             parts: words.iter().map(named).collect(),
-            folder: self.0.path().join(out),
+            folder: self.path(out),
             obstacles_only: true,
             ..ImportRequest::default()
         }
     }
-}
-
-pub(super) fn built(report: &ImportReport) -> BuiltScene {
-    let scene = Scene::load(Path::new(&report.scene));
-    scene.and_then(|scene| scene.build()).unwrap()
 }
 
 pub(super) fn volumes(report: &ImportReport, body: usize) -> (Vec<f64>, Soup) {
@@ -51,7 +35,7 @@ pub(super) fn volumes(report: &ImportReport, body: usize) -> (Vec<f64>, Soup) {
     (verdict.volumes, verdict.soup)
 }
 
-fn kinds(report: &ImportReport, body: usize) -> Vec<&'static str> {
+pub(super) fn kinds(report: &ImportReport, body: usize) -> Vec<&'static str> {
     let findings = report.parts[body].all_findings();
     findings.map(|finding| finding.kind).collect()
 }
@@ -75,7 +59,7 @@ fn files_of_any_format_unit_and_up_become_one_body() {
         folder.write("d.ply", ply(&scaled(meant[3].clone(), 1e2)));
         let mut words = ["all=a.stl", "all=b.obj", "all=c.glb", "all=d.ply"];
         words.rotate_left(round % 4);
-        let mut request = folder.request(&words, "out");
+        let mut request = folder.words(&words, "out");
         for part in &mut request.parts {
             let ending = part.path.extension().unwrap().to_str().unwrap();
             (part.unit, part.up) = match ending {
@@ -106,13 +90,8 @@ fn files_of_any_format_unit_and_up_become_one_body() {
         );
         let apart = one_sided(&soup, &all).max(one_sided(&all, &soup));
         assert!(apart < 1e-7, "{apart}");
-        assert!(
-            report
-                .to_string()
-                .contains("places above are those in the files")
-        );
-        let lines = report.to_string();
-        assert!(lines.contains("b.obj: shared 28 vertices"), "{lines}");
+        assert_says(&report, "places above are those in the files");
+        assert_says(&report, "b.obj: shared 28 vertices");
     }
 }
 
@@ -122,13 +101,13 @@ fn nothing_is_merged_between_files() {
     let folder = Folder::new();
     folder.write("a.ply", ply(&part()));
     folder.write("b.ply", ply(&moved(part(), [2.0 * HALF[0], 0.0, 0.0])));
-    let report = import(&folder.request(&["x=a.ply", "x=b.ply"], "out")).unwrap();
+    let report = import(&folder.words(&["x=a.ply", "x=b.ply"], "out")).unwrap();
     let (volumes, _) = volumes(&report, 0);
     assert_eq!(volumes.len(), 2, "{report}");
     assert_eq!(kinds(&report, 0), ["meets-itself"]);
-    assert!(report.to_string().contains("NOT MENDED"), "{report}");
+    assert_says(&report, "NOT MENDED");
     // Bodies of their own do not meet themselves.
-    let report = import(&folder.request(&["x=a.ply", "y=b.ply"], "two")).unwrap();
+    let report = import(&folder.words(&["x=a.ply", "y=b.ply"], "two")).unwrap();
     assert_eq!((report.parts.len(), kinds(&report, 1)), (2, vec![]));
 }
 
@@ -152,7 +131,7 @@ fn nesting_is_judged_of_all_files_together() {
                 words.insert(0, format!("x={k}.ply"));
             }
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
-            let report = import(&folder.request(&words, "out")).unwrap();
+            let report = import(&folder.words(&words, "out")).unwrap();
             let (mut found, _) = volumes(&report, 0);
             found.sort_by(|a, b| b.abs().total_cmp(&a.abs()));
             let expected = [whole[0], -whole[1], whole[2]];
@@ -188,7 +167,7 @@ fn coloured(soup: &Soup, materials: &[&str]) -> String {
 /// How many triangles of what is drawn have each red, green and blue; none where a material says nothing.
 fn drawn(report: &ImportReport, body: usize) -> Vec<(Option<[f32; 3]>, usize)> {
     let mut counts: Vec<(Option<[f32; 3]>, usize)> = Vec::new();
-    for (look, count) in &built(report).bodies[body + 1].looks {
+    for (look, count) in &built(&report.scene).bodies[body + 1].looks {
         match counts.iter_mut().find(|(color, _)| *color == look.color) {
             Some((_, all)) => *all += count,
             None => counts.push((look.color, *count)),
@@ -227,14 +206,14 @@ fn each_file_keeps_its_looks() {
         (&["x=red.obj", "x=red.obj"], vec![]),
     ] {
         let out = format!("out-{}", words.join("-"));
-        let report = import(&folder.request(words, &out)).unwrap();
+        let report = import(&folder.words(words, &out)).unwrap();
         let mut expected = expected;
         expected.sort_by_key(|(color, _)| color.map(|c: [f32; 3]| c.map(f32::to_bits)));
         assert_eq!(drawn(&report, 0), expected, "{words:?}: {report}");
         let lost = report.to_string().contains("of its look is not drawn: of ");
         assert_eq!(lost, words.contains(&"x=inside-out.obj"), "{report}");
         // What is drawn lies where what is felt does.
-        let scene = built(&report);
+        let scene = built(&report.scene);
         let [low, high] = scene.world.obstacles[0].mesh.bounding_box();
         let seen = scene.bodies[1].mesh.bounds().unwrap();
         assert!((seen.0 - low).norm() < 1e-6 && (seen.1 - high).norm() < 1e-6);
@@ -246,7 +225,7 @@ fn faults_of_all_files_of_a_body_are_told_at_once() {
     let folder = Folder::new();
     folder.write("good.ply", ply(&part()));
     folder.write("mm.ply", ply(&scaled(part(), 1e3)));
-    let request = folder.request(&["x=good.ply", "x=mm.ply", "x=none.ply"], "out");
+    let request = folder.words(&["x=good.ply", "x=mm.ply", "x=none.ply"], "out");
     let error = import(&request).unwrap_err();
     let files: Vec<&str> = error.problems().iter().map(|p| p.file.as_str()).collect();
     assert_eq!(files.len(), 2, "{error}");

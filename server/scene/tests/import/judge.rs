@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use super::solids::{Point, Soup, Triangle};
+use super::solids::{Point, Soup, Triangle, cross, dot, minus, six_volumes, soup_of};
 
 /// A surface, judged.
 #[derive(Debug)]
@@ -18,8 +18,7 @@ pub(crate) struct Verdict {
 
 pub(crate) fn judge(file: &Path) -> Verdict {
     let mesh = taut_scene::read_mesh(file).unwrap();
-    let corner = |v: u32| -> Point { mesh.vertices[v as usize].into() };
-    let soup: Soup = mesh.triangles.iter().map(|t| t.map(corner)).collect();
+    let soup = soup_of(&mesh);
 
     let directed = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
     let edges: Vec<[u32; 2]> = mesh.triangles.iter().flat_map(directed).collect();
@@ -52,26 +51,6 @@ pub(crate) fn judge(file: &Path) -> Verdict {
         volumes,
         soup,
     }
-}
-
-fn minus(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: Point, b: Point) -> Point {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn six_volumes([a, b, c]: &Triangle) -> f64 {
-    dot(*a, cross(*b, *c))
 }
 
 /// How often the surface goes around a place: 1 in a solid, 0 outside.

@@ -1,11 +1,11 @@
 //! Files of several pieces, and files that are no surfaces.
 
-use std::path::PathBuf;
-
 use taut_scene::{FileError, ImportReport, ImportRequest, import};
+use taut_test_kit::base64;
 
 use super::solids::part;
 use super::write::ply;
+use crate::support::{Folder, assert_says};
 
 /// Two tetrahedra in glTF: nodes "peg" and "block" below "tool", and another scene.
 fn gltf(more: &str) -> String {
@@ -34,49 +34,21 @@ fn gltf(more: &str) -> String {
     )
 }
 
-fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::new();
-    for three in bytes.chunks(3) {
-        let all = three
-            .iter()
-            .fold(0_u32, |all, byte| all << 8 | u32::from(*byte));
-        (0..4)
-            .rev()
-            .for_each(|k| text.push(char::from(LETTERS[(all >> (6 * k)) as usize & 63])));
-    }
-    text
-}
-
 fn imported(name: &str, bytes: impl AsRef<[u8]>, only: &[&str]) -> Result<ImportReport, FileError> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(name);
-    std::fs::write(&path, bytes).unwrap();
-    import(&request(vec![path], folder.path().join("out"), only))
-}
-
-fn request(parts: Vec<PathBuf>, folder: PathBuf, only: &[&str]) -> ImportRequest {
-    ImportRequest {
-        parts: parts.into_iter().map(Into::into).collect(),
-        folder,
+    let folder = Folder::new();
+    folder.write(name, bytes);
+    import(&ImportRequest {
         only: only.iter().map(|name| (*name).to_owned()).collect(),
-        obstacles_only: true,
-        ..ImportRequest::default()
-    }
+        ..folder.request(&[name])
+    })
 }
 
 #[test]
 fn pieces_and_scenes_that_are_left_out_are_told() {
     let report = imported("tool.gltf", gltf(""), &[]).unwrap();
     let told = report.to_string();
-    assert!(
-        told.contains("joined its 2 pieces in one body: \"block\", \"peg\""),
-        "{told}"
-    );
-    assert!(
-        told.contains("scene 1 \"store\" of the file is left out"),
-        "{told}"
-    );
+    assert_says(&told, "joined its 2 pieces in one body: \"block\", \"peg\"");
+    assert_says(&told, "scene 1 \"store\" of the file is left out");
     assert_eq!(report.parts[0].mesh.triangles, 8);
 }
 
@@ -90,31 +62,25 @@ fn only_the_chosen_nodes_are_taken() {
     ] {
         let report = imported("tool.gltf", gltf(""), only).unwrap();
         assert_eq!(report.parts[0].mesh.triangles, triangles, "{only:?}");
-        assert!(report.to_string().contains("took only"), "{report}");
+        assert_says(&report, "took only");
     }
     let error = imported("tool.gltf", gltf(""), &["pin"]).unwrap_err();
-    assert!(
-        error.to_string().contains("it has \"block\", \"peg\""),
-        "{error}"
-    );
+    assert_says(&error, "it has \"block\", \"peg\"");
     let error = imported("tool.gltf", gltf(""), &["peg", "pin"]).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("no part has a node, object or group \"pin\""),
-        "{error}"
-    );
+    assert_says(&error, "no part has a node, object or group \"pin\"");
     // Of another scene.
     assert!(imported("tool.gltf", gltf(""), &["spare"]).is_err());
 }
 
 #[test]
 fn a_file_without_names_is_taken_whole_beside_one_with_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let [tool, plain] = ["tool.gltf", "plain.ply"].map(|name| folder.path().join(name));
-    std::fs::write(&tool, gltf("")).unwrap();
-    std::fs::write(&plain, ply(&part())).unwrap();
-    let request = request(vec![tool, plain], folder.path().join("out"), &["peg"]);
+    let folder = Folder::new();
+    folder.write("tool.gltf", gltf(""));
+    folder.write("plain.ply", ply(&part()));
+    let request = ImportRequest {
+        only: vec!["peg".to_owned()],
+        ..folder.request(&["tool.gltf", "plain.ply"])
+    };
     let report = import(&request).unwrap();
     assert_eq!(report.parts[0].mesh.triangles, 4);
     assert_eq!(report.parts[1].mesh.triangles, part().len());
@@ -143,8 +109,6 @@ fn what_is_no_surface_is_refused_with_what_to_do() {
         let error = imported(name, bytes, &[]).unwrap_err().to_string();
         assert!(error.contains(expected), "{name}: {error}");
     }
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out");
-    let error = import(&request(vec![folder.path().into()], out, &[])).unwrap_err();
-    assert!(error.to_string().contains("is a directory"), "{error}");
+    let error = import(&Folder::new().request(&[""])).unwrap_err();
+    assert_says(&error, "is a directory");
 }

@@ -6,6 +6,7 @@ use taut_scene::{ImportRequest, import};
 use super::judge::{judge, one_sided};
 use super::solids::{Soup, cuboid, moved, soup_of};
 use super::write::{obj_soup, stl};
+use crate::support::Folder;
 
 /// A few triangles between few points: edges and faces meet in every way.
 fn rubble() -> impl Strategy<Value = Soup> {
@@ -50,15 +51,12 @@ fn imported(
     thicken: Option<f64>,
     close_holes: Option<usize>,
 ) -> Option<Soup> {
-    let folder = tempfile::tempdir().unwrap();
-    let part = folder.path().join(file);
-    std::fs::write(&part, bytes).unwrap();
+    let folder = Folder::new();
+    folder.write(file, bytes);
     let request = ImportRequest {
-        parts: vec![part.into()],
-        folder: folder.path().join("out"),
         thicken,
         close_holes,
-        ..ImportRequest::default()
+        ..folder.request(&[file])
     };
     let report = import(&request).ok()?;
     let verdict = judge(&request.folder.join(&report.parts[0].mesh_file));

@@ -4,37 +4,29 @@ use std::f64::consts::TAU;
 
 use taut_scene::{FileError, ImportReport, ImportRequest, import};
 
+use super::joined::kinds;
 use super::judge::{Verdict, judge, one_sided, winding};
-use super::solids::{HALF, Point, Soup, joined, mapped, moved, part, sheet};
+use super::solids::{HALF, Point, Soup, cross, dot, joined, mapped, minus, moved, part, sheet};
 use super::write::{ply, stl};
+use crate::support::{Folder, assert_says};
 
 const THICK: f64 = 1e-3;
 
 fn thickened(soup: &Soup, close: Option<usize>) -> Result<(ImportReport, Verdict), FileError> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.ply");
-    std::fs::write(&path, ply(soup)).unwrap();
+    let folder = Folder::new();
+    folder.write("a.ply", ply(soup));
     let report = import(&ImportRequest {
-        parts: vec![path.into()],
-        folder: folder.path().join("out"),
         thicken: Some(THICK),
         close_holes: close,
-        ..ImportRequest::default()
+        ..folder.request(&["a.ply"])
     })?;
-    let verdict = judge(&folder.path().join("out/a.ply"));
+    let verdict = judge(&folder.path("out/a.ply"));
     assert!(verdict.closed, "{report}");
     assert!(
         verdict.volumes.iter().all(|volume| *volume > 0.0),
         "{report}"
     );
     Ok((report, verdict))
-}
-
-fn kinds(report: &ImportReport) -> Vec<&'static str> {
-    report.parts[0]
-        .all_findings()
-        .map(|finding| finding.kind)
-        .collect()
 }
 
 /// Plates of 20 mm by 30 mm that all end at the z axis, in these directions.
@@ -75,27 +67,21 @@ fn plates_that_meet_at_an_edge_are_split_there_and_each_is_thick() {
         let what = format!("{degrees:?}");
         let made = thickened(&soup, None).unwrap();
         assert_eq!(made.1.volumes.len(), solids, "{what}: {}", made.0);
-        let kinds = kinds(&made.0);
+        let kinds = kinds(&made.0, 0);
         assert_eq!(kinds[0], "sheets-split", "{what}: {kinds:?}");
         assert!(kinds.contains(&"meets-itself"), "{what}: {kinds:?}");
         judge_solid(&soup, &made, &what);
         // Unasked it is refused with its place and what to write.
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.stl");
-        std::fs::write(&path, stl(&soup)).unwrap();
-        let request = ImportRequest {
-            parts: vec![path.into()],
-            folder: folder.path().join("out"),
-            ..ImportRequest::default()
-        };
-        let error = import(&request).unwrap_err().to_string();
+        let folder = Folder::new();
+        folder.write("a.stl", stl(&soup));
+        let error = import(&folder.request(&["a.stl"])).unwrap_err();
         let count = degrees.len();
         if count % 2 == 1 {
-            assert!(
-                error.contains(&format!("has {count} triangles at the edge about (")),
-                "{error}"
+            assert_says(
+                &error,
+                &format!("has {count} triangles at the edge about ("),
             );
-            assert!(error.contains("become solids with --thicken"), "{error}");
+            assert_says(&error, "become solids with --thicken");
         }
     }
 }
@@ -130,7 +116,7 @@ fn a_strip_with_one_side_becomes_a_solid_as_one_with_two() {
             let what = format!("{half_turns} half turns, {cells} cells");
             let made = thickened(&soup, None).unwrap();
             assert_eq!(made.1.volumes.len(), 1, "{what}");
-            let is_one_sided = kinds(&made.0).contains(&"one-sided");
+            let is_one_sided = kinds(&made.0, 0).contains(&"one-sided");
             assert_eq!(is_one_sided, half_turns % 2 == 1, "{what}: {}", made.0);
             judge_solid(&soup, &made, &what);
             let area: f64 = soup.iter().map(area).sum();
@@ -141,17 +127,12 @@ fn a_strip_with_one_side_becomes_a_solid_as_one_with_two() {
     }
     // Holes of a sheet with one side cannot be told from its border.
     let error = thickened(&strip(1, 24), Some(16)).unwrap_err().to_string();
-    assert!(error.contains("Moebius strip"), "{error}");
+    assert_says(&error, "Moebius strip");
 }
 
 fn area([a, b, c]: &[Point; 3]) -> f64 {
-    let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
-    let cross = [
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    ];
-    0.5 * cross.iter().map(|c| c * c).sum::<f64>().sqrt()
+    let twice = cross(minus(*b, *a), minus(*c, *a));
+    0.5 * dot(twice, twice).sqrt()
 }
 
 /// A box with a fin along one of its edges, a sheet far from it, both; and a wall across its inside.
@@ -177,7 +158,7 @@ fn solids_stay_as_they_are_beside_sheets_and_fins() {
             made.1.volumes
         );
         assert_eq!(
-            kinds(&made.0).contains(&"sheets-split"),
+            kinds(&made.0, 0).contains(&"sheets-split"),
             split,
             "{}",
             made.0
@@ -193,8 +174,5 @@ fn solids_stay_as_they_are_beside_sheets_and_fins() {
     let error = thickened(&joined([part(), wall]), None)
         .unwrap_err()
         .to_string();
-    assert!(
-        error.contains("it cannot be told which belong together"),
-        "{error}"
-    );
+    assert_says(&error, "it cannot be told which belong together");
 }

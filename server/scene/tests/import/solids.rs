@@ -52,10 +52,23 @@ pub(crate) fn joined<const N: usize>(soups: [Soup; N]) -> Soup {
 
 /// Six times the signed volume of a triangle and the origin.
 pub(crate) fn six_volumes([a, b, c]: &Triangle) -> f64 {
-    let [x, y, z] = *a;
-    x * (b[1] * c[2] - b[2] * c[1])
-        + y * (b[2] * c[0] - b[0] * c[2])
-        + z * (b[0] * c[1] - b[1] * c[0])
+    dot(*a, cross(*b, *c))
+}
+
+pub(crate) fn minus(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Point, b: Point) -> Point {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 /// With these triangles at the end.

@@ -2,9 +2,10 @@
 
 use taut_scene::{ImportRequest, import};
 
-use super::joined::{Folder, TWO_LOOKS, built, volumes};
+use super::joined::{TWO_LOOKS, volumes};
 use super::solids::{moved, part};
 use super::write::ply;
+use crate::support::{Folder, assert_says, built};
 
 /// Boxes in a row, as groups of an OBJ file: by name, with a colour each.
 fn groups(names: &[&str]) -> String {
@@ -41,12 +42,12 @@ fn each_piece_becomes_a_body_where_that_is_asked() {
         let request = ImportRequest {
             split: true,
             only: only.iter().map(|name| (*name).to_owned()).collect(),
-            ..folder.request(&["row.obj", "plain.ply"], &format!("out-{}", only.concat()))
+            ..folder.words(&["row.obj", "plain.ply"], &format!("out-{}", only.concat()))
         };
         let report = import(&request).unwrap();
         let names: Vec<&str> = report.parts.iter().map(|part| part.body.as_str()).collect();
         assert_eq!(names, expected);
-        let scene = built(&report);
+        let scene = built(&report.scene);
         for (k, name) in names.iter().enumerate() {
             let boxes = if *name == "pin" { 2 } else { 1 };
             let (found, _) = volumes(&report, k);
@@ -68,7 +69,7 @@ fn each_piece_becomes_a_body_where_that_is_asked() {
     let request = ImportRequest {
         split: true,
         obstacles_only: false,
-        ..folder.request(&["row.obj", "x=plain.ply"], "held")
+        ..folder.words(&["row.obj", "x=plain.ply"], "held")
     };
     let report = import(&request).unwrap();
     let names: Vec<&str> = report.parts.iter().map(|part| part.body.as_str()).collect();
@@ -87,10 +88,10 @@ fn sides_of_one_solid_are_no_bodies_and_that_is_said() {
         text += &format!("g side{}\nf {a} {b} {c}\n", t / 2);
     }
     folder.write("box.obj", text);
-    import(&folder.request(&["box.obj"], "whole")).unwrap();
+    import(&folder.words(&["box.obj"], "whole")).unwrap();
     let request = ImportRequest {
         split: true,
-        ..folder.request(&["box.obj"], "apart")
+        ..folder.words(&["box.obj"], "apart")
     };
     let error = import(&request).unwrap_err();
     assert_eq!(error.problems().len(), 6);
@@ -102,11 +103,8 @@ fn sides_of_one_solid_are_no_bodies_and_that_is_said() {
     let missing = ImportRequest {
         split: true,
         only: vec!["lid".into()],
-        ..folder.request(&["box.obj"], "missing")
+        ..folder.words(&["box.obj"], "missing")
     };
     let error = import(&missing).unwrap_err().to_string();
-    assert!(
-        error.contains("has no node, object or group \"lid\""),
-        "{error}"
-    );
+    assert_says(&error, "has no node, object or group \"lid\"");
 }

@@ -42,10 +42,10 @@ pub(super) fn clouds() -> Vec<Case> {
             "scan-thick.csv",
             "the same as text, in millimetres, to be a shell of 10 mm",
             text.into_bytes(),
-            whole.clone(),
-            &["shelled", "cavities"],
-            (2, shell(&whole, 1e-2)),
         )
+        .meant(whole.clone())
+        .finds(&["shelled", "cavities"])
+        .solids(2, shell(&whole, 1e-2))
         .options("--unit mm --thicken 0.01")
         .error(1e-3),
         bad(

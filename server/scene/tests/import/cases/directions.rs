@@ -1,6 +1,6 @@
 //! Triangles and parts that look the wrong way, and cavities.
 
-use super::{Case, ONE, bad, good};
+use super::{Case, bad, good};
 use crate::import::solids::{Soup, Triangle, VOLUME, cuboid, flipped, joined, moved, part};
 use crate::import::write::{ply, stl};
 
@@ -17,10 +17,8 @@ pub(super) fn turned() -> Vec<Case> {
             "inside-out.stl",
             "all triangles turned",
             stl(&flipped(part())),
-            part(),
-            &["parts-turned"],
-            ONE,
-        ),
+        )
+        .finds(&["parts-turned"]),
         good(
             "one-turned.stl",
             "one triangle turned",
@@ -28,26 +26,17 @@ pub(super) fn turned() -> Vec<Case> {
                 flipped(part()[..1].to_vec()),
                 part()[1..].to_vec(),
             ])),
-            part(),
-            &["triangles-turned"],
-            ONE,
-        ),
-        good(
-            "mixed.stl",
-            "every third triangle turned",
-            stl(&mixed),
-            part(),
-            &["triangles-turned"],
-            ONE,
-        ),
+        )
+        .finds(&["triangles-turned"]),
+        good("mixed.stl", "every third triangle turned", stl(&mixed)).finds(&["triangles-turned"]),
         good(
             "one-part-turned.stl",
             "two parts, one of them inside out",
             stl(&joined([part(), flipped(beside())])),
-            joined([part(), beside()]),
-            &["parts-turned"],
-            (2, 2.0 * VOLUME),
-        ),
+        )
+        .meant(joined([part(), beside()]))
+        .finds(&["parts-turned"])
+        .solids(2, 2.0 * VOLUME),
     ]
 }
 
@@ -61,34 +50,34 @@ pub(super) fn cavities() -> Vec<Case> {
             "cavity.ply",
             "a closed cavity",
             ply(&joined([part(), flipped(inner())])),
-            joined([part(), inner()]),
-            &["cavities"],
-            (2, VOLUME - INNER),
-        ),
+        )
+        .meant(joined([part(), inner()]))
+        .finds(&["cavities"])
+        .solids(2, VOLUME - INNER),
         good(
             "cavity-inside-out.ply",
             "a closed cavity, all turned",
             ply(&joined([flipped(part()), inner()])),
-            joined([part(), inner()]),
-            &["parts-turned", "cavities"],
-            (2, VOLUME - INNER),
-        ),
+        )
+        .meant(joined([part(), inner()]))
+        .finds(&["parts-turned", "cavities"])
+        .solids(2, VOLUME - INNER),
         good(
             "cavity-outward.ply",
             "a closed cavity whose wall is turned",
             ply(&joined([part(), inner()])),
-            joined([part(), inner()]),
-            &["parts-turned", "cavities"],
-            (2, VOLUME - INNER),
-        ),
+        )
+        .meant(joined([part(), inner()]))
+        .finds(&["parts-turned", "cavities"])
+        .solids(2, VOLUME - INNER),
         good(
             "core.ply",
             "a body in the cavity, turned",
             ply(&joined([part(), flipped(inner()), flipped(core())])),
-            joined([part(), inner(), core()]),
-            &["parts-turned", "cavities"],
-            (3, VOLUME - INNER + CORE),
-        ),
+        )
+        .meant(joined([part(), inner(), core()]))
+        .finds(&["parts-turned", "cavities"])
+        .solids(3, VOLUME - INNER + CORE),
     ]
 }
 

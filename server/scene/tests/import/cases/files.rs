@@ -1,50 +1,21 @@
 //! Formats, units, places, and files that are broken.
 
-use super::{Case, MM, ONE, bad, good};
+use super::{Case, MM, bad, good};
 use crate::import::solids::{VOLUME, moved, part, scaled};
 use crate::import::write::{glb, obj_soup, ply, stl, stl_text};
 
 pub(super) fn formats() -> Vec<Case> {
     vec![
-        good("clean.ply", "nothing", ply(&part()), part(), &[], ONE),
-        good(
-            "clean.stl",
-            "binary STL in metres",
-            stl(&part()),
-            part(),
-            &[],
-            ONE,
-        ),
-        good(
-            "text.stl",
-            "STL as text",
-            stl_text(&part()),
-            part(),
-            &[],
-            ONE,
-        ),
-        good(
-            "clean.glb",
-            "glTF, which is in metres",
-            glb(&part()),
-            part(),
-            &[],
-            ONE,
-        ),
+        good("clean.ply", "nothing", ply(&part())),
+        good("clean.stl", "binary STL in metres", stl(&part())),
+        good("text.stl", "STL as text", stl_text(&part())),
+        good("clean.glb", "glTF, which is in metres", glb(&part())),
     ]
 }
 
 pub(super) fn units() -> Vec<Case> {
     vec![
-        good(
-            "mm.stl",
-            "millimetres",
-            stl(&scaled(part(), MM)),
-            part(),
-            &[],
-            ONE,
-        )
-        .options("--unit mm"),
+        good("mm.stl", "millimetres", stl(&scaled(part(), MM))).options("--unit mm"),
         bad(
             "mm-unsaid.stl",
             "millimetres, but nobody says so",
@@ -55,10 +26,8 @@ pub(super) fn units() -> Vec<Case> {
             "inch.obj",
             "inches",
             obj_soup(&scaled(part(), 1.0 / 0.0254)),
-            part(),
-            &["vertices-equal"],
-            ONE,
         )
+        .finds(&["vertices-equal"])
         .options("--unit inch"),
         bad(
             "tiny.stl",
@@ -70,10 +39,9 @@ pub(super) fn units() -> Vec<Case> {
             "tiny-meant.stl",
             "a part of 60 um that is meant so",
             stl(&scaled(part(), 1e-3)),
-            scaled(part(), 1e-3),
-            &[],
-            (1, VOLUME * 1e-9),
         )
+        .meant(scaled(part(), 1e-3))
+        .solids(1, VOLUME * 1e-9)
         .options("--unit m"),
         bad(
             "huge.ply",
@@ -91,9 +59,6 @@ pub(super) fn far_places() -> Vec<Case> {
             "far.ply",
             "a kilometre from the origin, double precision",
             ply(&moved(part(), [1e3, 2e3, 0.0])),
-            part(),
-            &[],
-            ONE,
         )
         .error(1e-12),
         bad(
@@ -102,19 +67,12 @@ pub(super) fn far_places() -> Vec<Case> {
             stl(&moved(part(), [1e3, 2e3, 0.0])),
             "export it near the origin",
         ),
-        good(
-            "stray.ply",
-            "a vertex of no triangle, 1,000 km away",
-            {
-                let text = String::from_utf8(ply(&part())).unwrap();
-                text.replace("vertex 8", "vertex 9")
-                    .replacen("\n3 ", "\n1e6 0 0\n3 ", 1)
-                    .into_bytes()
-            },
-            part(),
-            &[],
-            ONE,
-        ),
+        good("stray.ply", "a vertex of no triangle, 1,000 km away", {
+            let text = String::from_utf8(ply(&part())).unwrap();
+            text.replace("vertex 8", "vertex 9")
+                .replacen("\n3 ", "\n1e6 0 0\n3 ", 1)
+                .into_bytes()
+        }),
     ]
 }
 

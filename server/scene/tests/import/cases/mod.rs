@@ -6,7 +6,7 @@ mod files;
 mod openings;
 mod surfaces;
 
-use crate::import::solids::{Soup, VOLUME};
+use crate::import::solids::{Soup, VOLUME, part};
 
 /// One file.
 pub(crate) struct Case {
@@ -40,25 +40,19 @@ pub(crate) enum Expected {
 /// Error of single precision for coordinates below 0.25 m: half a unit in the last place along each axis.
 const SINGLE: f64 = 1.3e-8;
 
-fn good(
-    file: &'static str,
-    what: &'static str,
-    bytes: Vec<u8>,
-    truth: Soup,
-    kinds: &'static [&'static str],
-    (parts, volume): (usize, f64),
-) -> Case {
+/// A file that is imported without a finding, as the box that most cases are made of.
+fn good(file: &'static str, what: &'static str, bytes: Vec<u8>) -> Case {
     Case {
         file,
         what,
         bytes,
         options: "",
-        truth,
+        truth: part(),
         error: SINGLE,
         expected: Expected::Imported {
-            kinds,
-            parts,
-            volume,
+            kinds: &[],
+            parts: 1,
+            volume: VOLUME,
         },
     }
 }
@@ -82,6 +76,24 @@ impl Case {
 
     fn error(self, error: f64) -> Self {
         Self { error, ..self }
+    }
+
+    fn meant(self, truth: Soup) -> Self {
+        Self { truth, ..self }
+    }
+
+    fn finds(mut self, found: &'static [&'static str]) -> Self {
+        if let Expected::Imported { kinds, .. } = &mut self.expected {
+            *kinds = found;
+        }
+        self
+    }
+
+    fn solids(mut self, count: usize, volume_m3: f64) -> Self {
+        if let Expected::Imported { parts, volume, .. } = &mut self.expected {
+            (*parts, *volume) = (count, volume_m3);
+        }
+        self
     }
 }
 
@@ -108,5 +120,4 @@ pub(crate) fn cases() -> Vec<Case> {
     .collect()
 }
 
-const ONE: (usize, f64) = (1, VOLUME);
 const MM: f64 = 1e3;

@@ -2,7 +2,7 @@
 
 use taut_scene::shapes::Axis;
 
-use super::{Case, ONE, bad, good};
+use super::{Case, bad, good};
 use crate::import::solids::{
     HALF, Soup, VOLUME, ball, flipped, joined, mapped, moved, part, sheet, six_volumes, soup_of,
     without,
@@ -24,62 +24,56 @@ pub(super) fn holes() -> Vec<Case> {
     let tin = || soup_of(&taut_scene::shapes::cylinder(0.02, 0.01, 24, Axis::Z));
     let opened = || without(tin(), |p| p[2] == 0.01);
     vec![
-        good(
-            "hole.ply",
-            "a triangle is missing",
-            ply(&without_some(1)),
-            whole.clone(),
-            &["holes-closed"],
-            (1, volume(&whole)),
-        ),
+        good("hole.ply", "a triangle is missing", ply(&without_some(1)))
+            .meant(whole.clone())
+            .finds(&["holes-closed"])
+            .solids(1, volume(&whole)),
         good(
             "holes.ply",
             "three triangles are missing",
             ply(&without_some(3)),
-            whole.clone(),
-            &["holes-closed"],
-            (1, volume(&whole)),
-        ),
+        )
+        .meant(whole.clone())
+        .finds(&["holes-closed"])
+        .solids(1, volume(&whole)),
         bad(
             "cup.ply",
             "a box without its upper face, unasked",
             ply(&cup()),
             "write --close-holes 4; if it is a sheet, write --thicken",
         ),
-        good(
-            "cup-closed.ply",
-            "the same, to be closed",
-            ply(&cup()),
-            part(),
-            &["holes-closed"],
-            ONE,
-        )
-        .options("--close-holes 4"),
+        good("cup-closed.ply", "the same, to be closed", ply(&cup()))
+            .finds(&["holes-closed"])
+            .options("--close-holes 4"),
         good(
             "cup-thick.ply",
             "the same, to be a cup of sheet metal",
             ply(&cup()),
-            cup(),
-            &["thickened"],
-            (1, 1.2808e-5),
         )
+        .meant(cup())
+        .finds(&["thickened"])
+        .solids(1, 1.2808e-5)
         .options("--thicken 0.002")
         .error(1e-12),
         good(
             "tin.ply",
             "a cylinder of 24 sides without its lid, to be closed",
             ply(&opened()),
-            tin(),
-            &["holes-closed"],
-            (1, volume(&tin())),
         )
+        .meant(tin())
+        .finds(&["holes-closed"])
+        .solids(1, volume(&tin()))
         .options("--close-holes 24"),
     ]
 }
 
 pub(super) fn sheets() -> Vec<Case> {
     let thickened = |file, what, soup: Soup, volume| {
-        good(file, what, stl(&soup), soup, &["thickened"], (1, volume)).options("--thicken 0.001")
+        good(file, what, stl(&soup))
+            .meant(soup)
+            .finds(&["thickened"])
+            .solids(1, volume)
+            .options("--thicken 0.001")
     };
     vec![
         bad(
@@ -112,19 +106,19 @@ pub(super) fn sheets() -> Vec<Case> {
             "tee.stl",
             "two sheets that make a T, to be 1 mm thick",
             stl(&tee()),
-            tee(),
-            &["sheets-split", "taken-apart", "thickened", "meets-itself"],
-            (2, 3.6e-6),
         )
+        .meant(tee())
+        .finds(&["sheets-split", "taken-apart", "thickened", "meets-itself"])
+        .solids(2, 3.6e-6)
         .options("--thicken 0.001"),
         good(
             "two-sided.ply",
             "a sheet of two sides with nothing between, to be 1 mm thick",
             ply(&joined([flat(), flipped(flat())])),
-            flat(),
-            &["backs", "thickened"],
-            (1, 2.4e-6),
         )
+        .meant(flat())
+        .finds(&["backs", "thickened"])
+        .solids(1, 2.4e-6)
         .options("--thicken 0.001"),
     ]
 }
@@ -171,37 +165,37 @@ pub(super) fn contacts() -> Vec<Case> {
             "at-an-edge.stl",
             "two boxes that touch at an edge",
             stl(&pair([2.0 * x, 2.0 * y, 0.0])),
-            pair([2.0 * x, 2.0 * y, 0.0]),
-            &["taken-apart"],
-            (2, 2.0 * VOLUME),
-        ),
+        )
+        .meant(pair([2.0 * x, 2.0 * y, 0.0]))
+        .finds(&["taken-apart"])
+        .solids(2, 2.0 * VOLUME),
         good(
             "at-a-vertex.stl",
             "two boxes that touch at a vertex",
             stl(&pair([2.0 * x, 2.0 * y, 2.0 * z])),
-            pair([2.0 * x, 2.0 * y, 2.0 * z]),
-            &["taken-apart"],
-            (2, 2.0 * VOLUME),
-        ),
+        )
+        .meant(pair([2.0 * x, 2.0 * y, 2.0 * z]))
+        .finds(&["taken-apart"])
+        .solids(2, 2.0 * VOLUME),
         good(
             "at-a-face.stl",
             "two boxes that touch with a whole face each",
             stl(&joined([part(), mirrored(x)])),
-            joined([
-                without(part(), |p| p[0] == x),
-                without(mirrored(x), |p| p[0] == x),
-            ]),
-            &["inner-walls"],
-            (1, 2.0 * VOLUME),
-        ),
+        )
+        .meant(joined([
+            without(part(), |p| p[0] == x),
+            without(mirrored(x), |p| p[0] == x),
+        ]))
+        .finds(&["inner-walls"])
+        .solids(1, 2.0 * VOLUME),
         good(
             "overlap.stl",
             "two boxes that overlap",
             stl(&pair([x, y, z])),
-            pair([x, y, z]),
-            &["meets-itself"],
-            (2, 2.0 * VOLUME),
-        ),
+        )
+        .meant(pair([x, y, z]))
+        .finds(&["meets-itself"])
+        .solids(2, 2.0 * VOLUME),
         bad(
             "inner-wall.ply",
             "a wall across the inside",
@@ -212,10 +206,10 @@ pub(super) fn contacts() -> Vec<Case> {
             "two.obj",
             "two boxes apart, triangles with vertices of their own",
             obj_soup(&pair([0.1, 0.0, 0.0])),
-            pair([0.1, 0.0, 0.0]),
-            &["vertices-equal"],
-            (2, 2.0 * VOLUME),
-        ),
+        )
+        .meant(pair([0.1, 0.0, 0.0]))
+        .finds(&["vertices-equal"])
+        .solids(2, 2.0 * VOLUME),
     ]
 }
 

@@ -1,6 +1,6 @@
 //! Vertices that are not shared, and triangles that are none or too many.
 
-use super::{Case, ONE, bad, good};
+use super::{Case, bad, good};
 use crate::import::solids::{
     HALF, Noise, Soup, ball, flipped, joined, mapped, moved, part, sheet, six_volumes, with,
     without,
@@ -17,35 +17,26 @@ pub(super) fn shared_vertices() -> Vec<Case> {
             "soup.ply",
             "triangles with vertices of their own",
             ply_soup(&part()),
-            part(),
-            &["vertices-equal"],
-            ONE,
-        ),
-        good(
-            "soup.obj",
-            "the same as OBJ",
-            obj_soup(&part()),
-            part(),
-            &["vertices-equal"],
-            ONE,
-        ),
+        )
+        .finds(&["vertices-equal"]),
+        good("soup.obj", "the same as OBJ", obj_soup(&part())).finds(&["vertices-equal"]),
         good(
             "noise.ply",
             "the same, each corner off by up to 1e-7 m",
             ply_soup(&Noise::new().on(ball(0.03), 1e-7)),
-            ball(0.03),
-            &["vertices-merged"],
-            (1, ball_volume()),
         )
+        .meant(ball(0.03))
+        .finds(&["vertices-merged"])
+        .solids(1, ball_volume())
         .error(2e-7),
         good(
             "rounded.stl",
             "each triangle rounded by itself, 1 m from the origin",
             stl(&Noise::new().on(moved(ball(0.03), [1.0, 1.0, 1.0]), 5e-8)),
-            ball(0.03),
-            &["vertices-merged"],
-            (1, ball_volume()),
         )
+        .meant(ball(0.03))
+        .finds(&["vertices-merged"])
+        .solids(1, ball_volume())
         .error(4e-7),
         bad(
             "cracks.ply",
@@ -57,10 +48,8 @@ pub(super) fn shared_vertices() -> Vec<Case> {
             "t-vertices.ply",
             "edges cut on one side only",
             ply(&with_t_vertices()),
-            part(),
-            &["sides-cut"],
-            ONE,
-        ),
+        )
+        .finds(&["sides-cut"]),
     ]
 }
 
@@ -95,25 +84,18 @@ pub(super) fn thin_triangles() -> Vec<Case> {
             "no-area.ply",
             "a triangle with two equal corners",
             ply(&with(part(), &[[a, a, b]])),
-            part(),
-            &["no-area"],
-            ONE,
-        ),
+        )
+        .finds(&["no-area"]),
         good(
             "in-line.ply",
             "a triangle with its corners in one line, as CAD programs leave them",
             ply(&with_flat_triangle()),
-            part(),
-            &["no-area", "sides-cut"],
-            ONE,
-        ),
+        )
+        .finds(&["no-area", "sides-cut"]),
         good(
             "sliver.ply",
             "a sliver 1e-8 m high, which is part of the surface",
             ply(&sliver()),
-            part(),
-            &[],
-            ONE,
         ),
     ]
 }
@@ -121,38 +103,25 @@ pub(super) fn thin_triangles() -> Vec<Case> {
 pub(super) fn copies() -> Vec<Case> {
     let first = part()[0];
     vec![
-        good(
-            "copy.ply",
-            "a triangle twice",
-            ply(&with(part(), &[first])),
-            part(),
-            &["copies"],
-            ONE,
-        ),
+        good("copy.ply", "a triangle twice", ply(&with(part(), &[first]))).finds(&["copies"]),
         good(
             "back.ply",
             "a triangle twice, back to back",
             ply(&with(part(), &flipped(vec![first]))),
-            part(),
-            &["backs"],
-            ONE,
-        ),
+        )
+        .finds(&["backs"]),
         good(
             "twice.ply",
             "the whole part twice",
             ply(&joined([part(), part()])),
-            part(),
-            &["copies"],
-            ONE,
-        ),
+        )
+        .finds(&["copies"]),
         good(
             "twice.obj",
             "the same, with vertices of their own",
             obj_soup(&joined([part(), part()])),
-            part(),
-            &["vertices-equal", "copies"],
-            ONE,
-        ),
+        )
+        .finds(&["vertices-equal", "copies"]),
     ]
 }
 
@@ -169,18 +138,14 @@ pub(super) fn whole_surfaces() -> Vec<Case> {
             "flat.ply",
             "768 triangles of a turned box: many in one plane, to rounding",
             ply(&tilted()),
-            tilted(),
-            &[],
-            ONE,
-        ),
+        )
+        .meant(tilted()),
         good(
             "fine.ply",
             "768 triangles of a box, simplified",
             ply(&fine_box()),
-            part(),
-            &["simplified"],
-            ONE,
         )
+        .finds(&["simplified"])
         .options("--simplify 1e-6"),
     ]
 }
