@@ -1,11 +1,11 @@
 //! Pictures that the server asks a drawing node for: what they show, how large they are, and that drawing goes on.
 //! Left out, said aloud, without a graphics adapter.
 
-use crate::live::{Server, can_draw, start, wait_for};
+use crate::live::{Server, barrier, can_draw, start, wait_for};
 
 use image::RgbImage;
 use taut_link::{NodePicture, PictureAnswer};
-use taut_proto::barrier::{MasterSettings, Swap};
+use taut_proto::barrier::Swap;
 use taut_proto::scene::Stereo;
 
 /// The pictures of each node that is in.
@@ -39,13 +39,6 @@ fn difference(one: &RgbImage, other: &RgbImage) -> f64 {
     sum as f64 / one.as_raw().len() as f64
 }
 
-fn frames_of(server: &Server, node: &str) -> u64 {
-    let clients = server.link.clients();
-    let status = clients.iter().find(|status| status.node == node);
-    let stats = status.and_then(|status| status.stats.as_ref());
-    stats.map_or(0, |stats| stats.frames)
-}
-
 #[test]
 fn a_node_sends_what_it_shows_of_each_screen_and_eye() {
     if !can_draw() {
@@ -57,7 +50,7 @@ fn a_node_sends_what_it_shows_of_each_screen_and_eye() {
     pair.stereo = None;
     let nodes = [start(both), start(pair)];
     wait_for("both draw", || {
-        frames_of(&server, "both") > 2 && frames_of(&server, "pair") > 2
+        server.frames("both") > 2 && server.frames("pair") > 2
     });
     let answers = asked(&server);
     assert_eq!(answers.len(), 2);
@@ -85,11 +78,11 @@ fn a_node_sends_what_it_shows_of_each_screen_and_eye() {
     assert!(difference(&eyes[0], &eyes[1]) > 0.1, "each its own eye");
     assert!(of(0)[0].age.as_secs_f64() < 10.0, "{:?}", of(0)[0].age);
     // Asked again and again, it draws on.
-    let before = frames_of(&server, "pair");
+    let before = server.frames("pair");
     for _ in 0..3 {
         assert!(asked(&server).iter().all(|answer| answer.pictures.is_ok()));
     }
-    wait_for("it draws on", || frames_of(&server, "pair") > before);
+    wait_for("it draws on", || server.frames("pair") > before);
     server.stop();
     for node in nodes {
         node.join().expect("no panic").expect("ends in good order");
@@ -101,16 +94,12 @@ fn a_large_picture_is_scaled_down_and_keeps_both_eyes_and_its_barrier() {
     if !can_draw() {
         return;
     }
-    let server = Server::start_with(Some(MasterSettings {
-        swap: Swap::Immediate,
-        period_ns: 16_666_667,
-        slowest_ns: 1_000_000_000,
-    }));
+    let server = Server::start_with(Some(barrier(Swap::Immediate)));
     let mut args = server.args("both");
     (args.width, args.height) = (Some(2000), Some(300));
     args.stereo = Some(Stereo::SideBySide);
     let node = start(args);
-    wait_for("it draws", || frames_of(&server, "both") > 2);
+    wait_for("it draws", || server.frames("both") > 2);
     let answers = asked(&server);
     let pictures = answers[0].pictures.as_ref().expect("pictures");
     for picture in pictures {

@@ -14,7 +14,7 @@ use taut_render::renderer::shapes;
 use taut_render::stage::{Stage, TriangleMesh};
 
 use crate::perceptual::{difference, halved};
-use crate::support::{canvas, peg_in_hole, state};
+use crate::support::{canvas, peg_in_hole, pictures, state};
 
 /// A surface over longitude and latitude, m.
 fn globe(rings: u32, place: impl Fn(f32, f32) -> [f32; 3]) -> TriangleMesh {
@@ -174,9 +174,7 @@ fn drawn(mesh: &TriangleMesh, scale: f64, whole: bool) -> Option<(u64, Vec<RgbaI
         canvas.draw_all_triangles();
     }
     let latched = state(Isometry3::translation(0.0, -0.05, 0.0));
-    canvas.draw(&latched, Show::default(), true).expect("drawn");
-    let images = canvas.images().expect("read back");
-    let images = images.into_iter().map(|(_, image)| image).collect();
+    let images = pictures(&mut canvas, &latched, Show::default());
     Some((canvas.renderer().triangles_drawn(), images))
 }
 

@@ -3,7 +3,7 @@
 use taut_proto::scene::Show;
 use taut_proto::scene::Stereo;
 
-use crate::support::{canvas, peg_in_hole, state};
+use crate::support::{on_wall, peg_in_hole, shown, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Similarity3};
 use taut_proto::{Finish, Panorama};
@@ -25,13 +25,9 @@ fn coloured() -> Panorama {
 
 /// A white ball before the wall, of one finish, in coloured light.
 fn ball(finish: Finish, turned: f64) -> Stage {
-    let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
-    stage.screens.truncate(1);
-    stage.head = Isometry3::translation(0.0, -1.2, 0.6);
+    let mut stage = on_wall(shapes::sphere(0.2, 64), PIXELS, Stereo::Mono);
     let around = nalgebra::Vector3::z() * turned;
     stage.workbench_from_scene = Similarity3::new(nalgebra::Vector3::zeros(), around, 1.0);
-    stage.meshes = vec![shapes::sphere(0.2, 64).into()];
-    stage.obstacles.clear();
     stage.god_object.colour = [1.0; 3];
     stage.god_object.finish = Some(finish);
     stage.environment = Environment::of(Some(&coloured()));
@@ -39,14 +35,12 @@ fn ball(finish: Finish, turned: f64) -> Stage {
 }
 
 fn draw(stage: Stage, reflections: bool) -> Option<RgbaImage> {
-    let mut canvas = canvas(stage)?;
     let show = Show {
         reflections,
         ..Show::default()
     };
     let at = state(Isometry3::translation(0.0, 0.0, 0.6));
-    canvas.draw(&at, show, true).expect("drawn");
-    Some(canvas.images().expect("read back").remove(0).1)
+    Some(shown(stage, &at, show)?.remove(0))
 }
 
 /// Colour of the ball so far right of and above its middle, in its radii (40 pixels).
@@ -137,13 +131,11 @@ fn a_body_that_is_not_drawn_leaves_light_and_shadows_as_they_are() {
 /// Two panes in one plane, the middle of each nearer to another eye.
 #[test]
 fn both_eyes_see_translucent_bodies_over_each_other_in_one_order() {
-    let mut stage = peg_in_hole(PIXELS, Stereo::TwoWindows);
-    stage.screens.truncate(1);
-    stage.head = Isometry3::translation(0.0, -1.2, 0.6);
-    stage.workbench_from_scene = Similarity3::identity();
+    let small = shapes::cuboid([0.01; 3]);
+    let mut stage = on_wall(small, PIXELS, Stereo::TwoWindows);
     stage.meshes.push(shapes::cuboid([0.3, 0.01, 0.2]).into());
     let pane = |x: f64, colour: [f32; 3]| StageBody {
-        mesh: 2,
+        mesh: 1,
         pose: Isometry3::translation(x, 0.0, 0.6),
         colour,
         opacity: 0.8,

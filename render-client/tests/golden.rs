@@ -10,7 +10,7 @@ use taut_proto::scene::Show;
 use taut_proto::scene::Stereo;
 
 use crate::perceptual::{difference, halved};
-use crate::support::{canvas, peg_in_hole, state};
+use crate::support::{canvas, draw, peg_in_hole, pictures, shown, state};
 use image::{RgbImage, RgbaImage};
 use nalgebra::{Isometry3, Similarity3};
 use taut_proto::Finish;
@@ -23,7 +23,7 @@ use taut_render::timeline::Latched;
 /// Pixels of a view as drawn.
 const PIXELS: (u32, u32) = (240, 160);
 
-/// Names of the golden pictures, in the order in which [`pictures`] draws them.
+/// Names of the golden pictures, in the order in which [`all_pictures`] draws them.
 const NAMES: [&str; 10] = [
     "front-left",
     "front-right",
@@ -41,26 +41,15 @@ fn half_way_in() -> Latched {
     state(Isometry3::translation(0.0, -0.042, 0.0))
 }
 
-fn draw(
-    stage: Stage,
-    latched: &Latched,
-    show: Show,
-    status: &NodeStatus,
-) -> Option<Vec<RgbaImage>> {
-    let mut canvas = canvas(stage)?;
-    canvas.set_status(status.clone());
-    canvas.draw(latched, show, true).expect("drawn");
-    let images = canvas.images().expect("read back");
-    Some(images.into_iter().map(|(_, image)| image).collect())
+/// The wall, and over it what a node says of its link.
+fn over(latched: &Latched, show: Show, link: LinkHealth) -> Option<Vec<RgbaImage>> {
+    let mut canvas = canvas(wall(Stereo::Mono))?;
+    canvas.set_status(status(link));
+    Some(pictures(&mut canvas, latched, show))
 }
 
 fn plain(stage: Stage) -> Option<Vec<RgbaImage>> {
-    draw(
-        stage,
-        &half_way_in(),
-        Show::default(),
-        &NodeStatus::default(),
-    )
+    shown(stage, &half_way_in(), Show::default())
 }
 
 /// The peg before its hole, raised so that wall and table both show it.
@@ -127,15 +116,13 @@ fn status(link: LinkHealth) -> NodeStatus {
 }
 
 /// All pictures as drawn now; `None` without an adapter.
-fn pictures() -> Option<Vec<RgbImage>> {
+fn all_pictures() -> Option<Vec<RgbImage>> {
     let mut drawn = plain(raised(PIXELS, Stereo::TwoWindows))?;
     drawn.extend(plain(wall(Stereo::Anaglyph))?);
     let hud = Show {
         hud: true,
         ..Show::default()
     };
-    let over =
-        |latched: &Latched, show, link| draw(wall(Stereo::Mono), latched, show, &status(link));
     drawn.extend(over(&half_way_in(), hud, LinkHealth::Connected)?);
     let mut stale = half_way_in();
     stale.stale = true;
@@ -150,7 +137,7 @@ fn pictures() -> Option<Vec<RgbImage>> {
             ..Show::default()
         };
         let at = state(materials().god_object.pose);
-        drawn.extend(draw(materials(), &at, show, &NodeStatus::default())?);
+        drawn.extend(shown(materials(), &at, show)?);
     }
     Some(drawn.iter().map(halved).collect())
 }
@@ -161,7 +148,7 @@ fn folder() -> PathBuf {
 
 #[test]
 fn pictures_look_as_they_did() {
-    let Some(pictures) = pictures() else {
+    let Some(pictures) = all_pictures() else {
         return;
     };
     let write = std::env::var_os("TAUT_WRITE_GOLDEN").is_some();
@@ -265,19 +252,17 @@ fn a_wrong_colour_is_seen() {
 #[test]
 fn a_missing_shadow_is_seen() {
     // The picture without the peg, and the peg's own pixels put back: all is there but its shadow.
-    let at = state(Isometry3::translation(0.0, -0.07, 0.03));
-    let away = state(Isometry3::translation(0.0, -5.0, 0.0));
+    let at = Isometry3::translation(0.0, -0.07, 0.03);
+    let away = Isometry3::translation(0.0, -5.0, 0.0);
     let table = || {
         let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
         stage.screens.remove(0);
         stage
     };
-    let show = Show::default();
-    let status = NodeStatus::default();
-    let Some(with) = draw(table(), &at, show, &status) else {
+    let Some(with) = draw(table(), at) else {
         return;
     };
-    let mut without = draw(table(), &away, show, &status).expect("as before");
+    let mut without = draw(table(), away).expect("as before");
     let mut put_back = 0;
     for (pixel, original) in without[0].pixels_mut().zip(with[0].pixels()) {
         let [red, _, blue, _] = original.0;
@@ -295,14 +280,14 @@ fn a_missing_shadow_is_seen() {
 fn a_missing_banner_is_seen() {
     let mut stale = half_way_in();
     stale.stale = true;
-    let over = |link| {
-        let drawn = draw(wall(Stereo::Mono), &stale, Show::default(), &status(link))?;
+    let banner = |link| {
+        let drawn = over(&stale, Show::default(), link)?;
         Some(halved(&drawn[0]))
     };
-    let Some(old) = over(LinkHealth::Connected) else {
+    let Some(old) = banner(LinkHealth::Connected) else {
         return;
     };
-    let lost = over(LinkHealth::Lost {
+    let lost = banner(LinkHealth::Lost {
         since: Duration::from_millis(3500),
     })
     .expect("as before");

@@ -1,12 +1,12 @@
 //! When pictures light up, as a Wayland compositor tells it: weston without a screen, whose repaints are those of a timer.
 #![cfg(target_os = "linux")]
 
-use crate::live::{Server, can_draw, wait_for};
+use crate::live::{Server, barrier, can_draw, wait_for};
 use crate::windows::program;
 
 use std::process::{Child, Command, Stdio};
 
-use taut_proto::barrier::{MasterSettings, Swap};
+use taut_proto::barrier::Swap;
 
 /// A Wayland compositor without a screen, until it is dropped.
 struct Compositor {
@@ -129,11 +129,7 @@ fn the_server_knows_how_far_apart_two_nodes_lit_up() {
     let Some(compositor) = compositor() else {
         return;
     };
-    let server = Server::start_with(Some(MasterSettings {
-        swap: Swap::Scheduled,
-        period_ns: 16_666_667,
-        slowest_ns: 1_000_000_000,
-    }));
+    let server = Server::start_with(Some(barrier(Swap::Scheduled)));
     let nodes = ["both", "pair"].map(|node| {
         let more = ["--width", "160", "--fps", "8"];
         compositor

@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use taut_link::{Content, ServerLink, ServerOptions, create_key_file, serve};
-use taut_proto::barrier::MasterSettings;
+use taut_proto::barrier::{MasterSettings, Swap};
 use taut_proto::mesh_blob::Positions;
 use taut_proto::scene::{
     BodyDescription, NodeDescription, ScreenDescription, Stereo, WindowDescription,
@@ -30,6 +30,15 @@ pub struct Server {
     pub stop: Arc<AtomicBool>,
     sender: Option<JoinHandle<()>>,
     leader: Option<JoinHandle<()>>,
+}
+
+/// 60 frames a second; a node may take a second for one.
+pub fn barrier(swap: Swap) -> MasterSettings {
+    MasterSettings {
+        swap,
+        period_ns: 16_666_667,
+        slowest_ns: 1_000_000_000,
+    }
 }
 
 fn blob(mesh: &TriangleMesh) -> MeshBlob {
@@ -202,6 +211,14 @@ impl Server {
                 ..MembershipArgs::default()
             },
         }
+    }
+
+    /// Frames that this node has reported.
+    pub fn frames(&self, node: &str) -> u64 {
+        let clients = self.link.clients();
+        let status = clients.iter().find(|status| status.node == node);
+        let stats = status.and_then(|status| status.stats.as_ref());
+        stats.map_or(0, |stats| stats.frames)
     }
 
     pub fn pictures(&self) -> PathBuf {

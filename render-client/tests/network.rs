@@ -1,7 +1,7 @@
 //! A node in a session with a real server on this machine: joins, fetches, draws, reports, ends.
 //! Left out, said aloud, without a graphics adapter.
 
-use crate::live::{Server, can_draw, content, start, wait_for};
+use crate::live::{Server, barrier, can_draw, content, start, wait_for};
 
 use std::sync::atomic::Ordering;
 
@@ -135,16 +135,10 @@ fn a_node_with_two_pictures_per_screen_names_them_by_eye() {
     }
     let server = Server::start();
     let mut args = server.args("pair");
-    args.frames = Some(1);
-    args.out = Some(server.pictures());
+    (args.frames, args.out) = (Some(1), Some(server.pictures()));
     taut_render::run(args).expect("draws");
     for eye in ["left", "right"] {
-        assert!(
-            server
-                .pictures()
-                .join(format!("pair-wall-{eye}-00001.png"))
-                .is_file()
-        );
+        server.picture(&format!("pair-wall-{eye}-00001.png"));
     }
     server.stop();
 }
@@ -156,26 +150,11 @@ fn a_node_ends_in_good_order_when_the_server_says_that_it_stops() {
     }
     let server = Server::start();
     let node = start(server.args("both"));
-    wait_for("a report of frames", || {
-        let clients = server.link.clients();
-        clients
-            .iter()
-            .any(|c| c.stats.as_ref().is_some_and(|stats| stats.frames > 0))
-    });
-    let mismatches: u64 = server
-        .link
-        .clients()
-        .iter()
-        .map(|c| c.state_hash_mismatches)
-        .sum();
-    let matches: u64 = server
-        .link
-        .clients()
-        .iter()
-        .map(|c| c.state_hash_matches)
-        .sum();
-    assert_eq!(mismatches, 0);
-    assert!(matches > 0, "the states drawn are those that were sent");
+    wait_for("a report of frames", || server.frames("both") > 0);
+    let clients = server.link.clients();
+    assert!(clients.iter().all(|c| c.state_hash_mismatches == 0));
+    let some = clients.iter().any(|c| c.state_hash_matches > 0);
+    assert!(some, "the states drawn are those that were sent");
     server.stop();
     let report = node.join().expect("no panic").expect("a good end");
     assert_eq!(report.ended, Ended::ServerStopped);
@@ -188,11 +167,7 @@ fn nodes_show_the_frames_that_the_barrier_releases() {
         return;
     }
     for swap in [Swap::Immediate, Swap::Scheduled] {
-        let server = Server::start_with(Some(MasterSettings {
-            swap,
-            period_ns: 16_666_667,
-            slowest_ns: 1_000_000_000,
-        }));
+        let server = Server::start_with(Some(barrier(swap)));
         let nodes = ["both", "pair"].map(|node| {
             start(RenderArgs {
                 fps: Some(8.0), // what software can do beside other tests: everybody's rate, because the slowest's is
@@ -224,9 +199,8 @@ fn a_node_below_the_least_rate_keeps_to_its_own() {
         return;
     }
     let server = Server::start_with(Some(MasterSettings {
-        swap: Swap::Immediate,
-        period_ns: 16_666_667,
         slowest_ns: 50_000_000,
+        ..barrier(Swap::Immediate)
     }));
     let report = taut_render::run(RenderArgs {
         fps: Some(2.0),
@@ -246,12 +220,7 @@ fn a_node_with_two_screens_shows_one_instant_on_both_with_a_barrier_and_without(
     if !can_draw() {
         return;
     }
-    let barrier = MasterSettings {
-        swap: Swap::Immediate,
-        period_ns: 16_666_667,
-        slowest_ns: 1_000_000_000,
-    };
-    for frames in [Some(barrier), None] {
+    for frames in [Some(barrier(Swap::Immediate)), None] {
         let is_locked = frames.is_some();
         let server = Server::start_with(frames);
         let mut args = server.args("twice");

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use taut_proto::scene::Stereo;
 
-use crate::support::{draw, peg_in_hole};
+use crate::support::{draw, on_wall, peg_in_hole};
 use image::RgbaImage;
-use nalgebra::{Isometry3, Matrix3, Point3, Similarity3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use taut_render::calibration::Chart;
 use taut_render::correction::Correction;
 use taut_render::renderer::shapes;
@@ -69,12 +69,9 @@ fn correct(stage: &mut Stage, correction: Correction) {
 
 /// A small bright plate that faces the wall's viewer, and nothing else; the wall only.
 fn plate(stereo: Stereo) -> Stage {
-    let mut stage = peg_in_hole(PIXELS, stereo);
-    stage.screens.truncate(1);
-    stage.workbench_from_scene = Similarity3::identity();
-    stage.meshes = vec![shapes::cuboid([0.012, 0.0002, 0.012]).into()];
+    let mut stage = on_wall(shapes::cuboid([0.012, 0.0002, 0.012]), PIXELS, stereo);
+    stage.head = Isometry3::translation(0.12, -1.1, 0.85);
     stage.god_object.colour = [0.9, 0.22, 0.02];
-    stage.obstacles.clear();
     stage
 }
 

@@ -3,7 +3,7 @@
 use taut_proto::Finish;
 use taut_proto::scene::{Show, Stereo};
 
-use crate::support::{GREY_BLUE, canvas, draw, peg_in_hole, state};
+use crate::support::{GREY_BLUE, canvas, draw, on_wall, peg_in_hole, pictures, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Vector3};
 use taut_render::renderer::shapes;
@@ -197,12 +197,7 @@ fn a_body_is_seen_before_ground_of_its_own_colour() {
 
 #[test]
 fn a_mark_has_a_dark_rim_before_a_body_of_its_own_colour() {
-    let mut stage = peg_in_hole((720, 480), Stereo::Mono);
-    stage.screens.truncate(1);
-    stage.head = Isometry3::translation(0.0, -1.2, 0.6);
-    stage.workbench_from_scene = Similarity3::identity();
-    stage.meshes = vec![shapes::sphere(0.4, 64).into()];
-    stage.obstacles.clear();
+    let mut stage = on_wall(shapes::sphere(0.4, 64), (720, 480), Stereo::Mono);
     stage.god_object.colour = [0.85, 0.03, 0.02]; // that of contacts
     let mut latched = state(Isometry3::translation(0.0, 0.1, 0.6));
     latched.state.contacts = vec![Contact {
@@ -217,8 +212,7 @@ fn a_mark_has_a_dark_rim_before_a_body_of_its_own_colour() {
             contacts,
             ..Show::default()
         };
-        canvas.draw(&latched, show, true).expect("drawn");
-        canvas.images().expect("read back").remove(0).1
+        pictures(&mut canvas, &latched, show).remove(0)
     };
     let (bare, marked) = (red(false), red(true));
     let darker =

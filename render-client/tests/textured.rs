@@ -13,7 +13,7 @@ use taut_render::stage::{Stage, StageBody, StageScreen, TriangleMesh};
 use taut_render::textures::{MeshTextures, SizedTexture};
 use taut_render::view::{ClipPlanes, Screen};
 
-use crate::support::{canvas, draw, state};
+use crate::support::{canvas, draw, pictures, state};
 
 const PIXELS: u32 = 200;
 /// Half the side of the screen and of the square, m.
@@ -354,10 +354,8 @@ fn fewer_triangles_show_the_picture_where_all_of_them_do() {
             if all { 1e-6 } else { 2e-6 },
             0.0,
         ));
-        canvas.draw(&here, Show::default(), true).expect("drawn");
-        let drawn = canvas.renderer().triangles_drawn() - before;
-        let image = canvas.images().expect("read back").remove(0).1;
-        (image, drawn)
+        let image = pictures(&mut canvas, &here, Show::default()).remove(0);
+        (image, canvas.renderer().triangles_drawn() - before)
     };
     let ((few, drawn_few), (all, drawn_all)) = (picture(false), picture(true));
     // Shadows, whose texels are finer, are half of them.

@@ -167,12 +167,7 @@ fn a_node_that_is_asked_to_end_leaves_in_good_order() {
     let child = program(&server, "both", &["--headless", "--width", "60"])
         .spawn()
         .expect("runs");
-    wait_for("a report of frames", || {
-        let clients = server.link.clients();
-        clients
-            .iter()
-            .any(|c| c.stats.as_ref().is_some_and(|stats| stats.frames > 0))
-    });
+    wait_for("a report of frames", || server.frames("both") > 0);
     let asked = Command::new("kill")
         .args(["-TERM", &child.id().to_string()])
         .status();

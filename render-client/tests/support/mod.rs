@@ -75,6 +75,17 @@ pub(crate) fn peg_in_hole(pixels: (u32, u32), stereo: Stereo) -> Stage {
     }
 }
 
+/// The wall alone, and nothing before it but a body in the hand, as large as it is.
+pub(crate) fn on_wall(body: TriangleMesh, pixels: (u32, u32), stereo: Stereo) -> Stage {
+    let mut stage = peg_in_hole(pixels, stereo);
+    stage.screens.truncate(1);
+    stage.head = Isometry3::translation(0.0, -1.2, 0.6);
+    stage.workbench_from_scene = Similarity3::identity();
+    stage.meshes = vec![body.into()];
+    stage.obstacles.clear();
+    stage
+}
+
 /// A cube of these half extents with a round hole along y through its middle.
 pub(crate) fn box_with_hole(half: f32, radius: f32, facets: u32) -> TriangleMesh {
     assert!(
@@ -128,12 +139,19 @@ pub(crate) fn canvas(stage: Stage) -> Option<Canvas> {
     }
 }
 
-/// The pictures of a stage with the body at `pose`; `None` where there is nothing to draw with.
-pub(crate) fn draw(stage: Stage, pose: Isometry3<f64>) -> Option<Vec<RgbaImage>> {
-    let mut canvas = canvas(stage)?;
-    canvas
-        .draw(&state(pose), Show::default(), true)
-        .expect("drawn");
+/// The pictures of a state, in order.
+pub(crate) fn pictures(canvas: &mut Canvas, latched: &Latched, show: Show) -> Vec<RgbaImage> {
+    canvas.draw(latched, show, true).expect("drawn");
     let images = canvas.images().expect("read back");
-    Some(images.into_iter().map(|(_, image)| image).collect())
+    images.into_iter().map(|(_, image)| image).collect()
+}
+
+/// The pictures of a stage in a state; `None` where there is nothing to draw with.
+pub(crate) fn shown(stage: Stage, latched: &Latched, show: Show) -> Option<Vec<RgbaImage>> {
+    Some(pictures(&mut canvas(stage)?, latched, show))
+}
+
+/// The same with the body at `pose`.
+pub(crate) fn draw(stage: Stage, pose: Isometry3<f64>) -> Option<Vec<RgbaImage>> {
+    shown(stage, &state(pose), Show::default())
 }
