@@ -218,7 +218,7 @@ pub fn clip_from_target(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::view::project;
     use taut_screens::{Across, OutputNode};
@@ -228,18 +228,17 @@ mod tests {
         far: 20.0,
     };
 
-    /// A quarter of a cylinder of 1.2 m around the z axis, 1 m high, seen from within.
-    fn cylinder() -> OutputMesh {
-        let (columns, rows) = (65, 5);
+    /// A surface that is lit at these points, by shares of the output.
+    pub(crate) fn surface(
+        (columns, rows): (usize, usize),
+        target: impl Fn(f32, f32) -> [f32; 3],
+    ) -> OutputMesh {
         let node = |i: usize| {
-            let (s, t) = (
-                (i % columns) as f32 / (columns - 1) as f32,
-                (i / columns) as f32 / (rows - 1) as f32,
-            );
-            let angle = (s - 0.5) * std::f32::consts::FRAC_PI_2;
+            let s = (i % columns) as f32 / (columns - 1) as f32;
+            let t = (i / columns) as f32 / (rows - 1) as f32;
             OutputNode {
                 place: [s, t],
-                target: [1.2 * angle.sin(), 1.2 * angle.cos(), t],
+                target: target(s, t),
                 share: 1.0,
             }
         };
@@ -250,6 +249,14 @@ mod tests {
             rows,
             nodes: (0..columns * rows).map(node).collect(),
         }
+    }
+
+    /// A quarter of a cylinder of 1.2 m around the z axis, 1 m high, seen from within.
+    fn cylinder() -> OutputMesh {
+        surface((65, 5), |s, t| {
+            let angle = (s - 0.5) * std::f32::consts::FRAC_PI_2;
+            [1.2 * angle.sin(), 1.2 * angle.cos(), t]
+        })
     }
 
     #[test]

@@ -207,6 +207,17 @@ mod tests {
         gaps.fold(0.0, f64::max)
     }
 
+    /// A predictor that was told poses of a head after these gaps, and the time of the last one, ns.
+    fn tracked(gaps: Vec<u64>, pose: impl Fn(u64) -> Isometry3<f64>) -> (HeadPredictor, u64) {
+        let mut predictor = HeadPredictor::default();
+        let mut now = 0;
+        for gap in gaps {
+            now += gap;
+            predictor.push(now, Some(&head(pose(now))));
+        }
+        (predictor, now)
+    }
+
     /// Gaps between samples of a tracker that is not regular, in nanoseconds.
     fn gaps() -> impl Strategy<Value = Vec<u64>> {
         proptest::collection::vec(200_000u64..20 * MS, 12..80)
@@ -223,12 +234,7 @@ mod tests {
             let twist = Twist { linear: linear.into(), angular: angular.into() };
             let start = Isometry3::new(Vector3::new(0.1, -1.1, 0.8), Vector3::new(1.2, 0.1, 0.0));
             let truth = |ns: u64| start * exp(&twist, ns as f64 * 1e-9);
-            let mut predictor = HeadPredictor::default();
-            let mut now = 0;
-            for gap in gaps {
-                now += gap;
-                predictor.push(now, Some(&head(truth(now))));
-            }
+            let (predictor, now) = tracked(gaps, truth);
             let found = predictor.at(now + ahead).expect("tracked").pose;
             prop_assert!(apart(&found, &truth(now + ahead)) < 1e-9);
         }
@@ -243,12 +249,7 @@ mod tests {
             let truth = |ns: u64| {
                 Isometry3::translation(amplitude * (omega * ns as f64 * 1e-9).sin(), 0.0, 0.0)
             };
-            let mut predictor = HeadPredictor::default();
-            let mut now = 0;
-            for gap in gaps {
-                now += gap;
-                predictor.push(now, Some(&head(truth(now))));
-            }
+            let (predictor, now) = tracked(gaps, truth);
             let found = predictor.at(now + ahead).expect("tracked").pose;
             let (h, b) = (ahead as f64 * 1e-9, BASELINE_NS as f64 * 1e-9);
             let bound = amplitude * omega * omega * h * (b + h) / 2.0;
@@ -259,13 +260,8 @@ mod tests {
         fn no_prediction_goes_past_the_cap(
             gaps in gaps(), speed in -3.0..3.0f64, ahead in MAX_HORIZON_NS..100_000 * MS,
         ) {
-            let mut predictor = HeadPredictor::default();
-            let mut now = 0;
-            for gap in gaps {
-                now += gap;
-                let pose = Isometry3::translation(speed * now as f64 * 1e-9, 0.0, 0.0);
-                predictor.push(now, Some(&head(pose)));
-            }
+            let moves = |ns: u64| Isometry3::translation(speed * ns as f64 * 1e-9, 0.0, 0.0);
+            let (predictor, now) = tracked(gaps, moves);
             let newest = predictor.at(now).expect("tracked").pose;
             let capped = predictor.at(now + MAX_HORIZON_NS).expect("tracked").pose;
             let later = predictor.at(now + ahead).expect("tracked").pose;

@@ -84,33 +84,17 @@ impl Overlay {
         if !self.lines.is_empty() {
             let texts: Vec<(&str, f32)> = self.lines.iter().map(|l| (l.as_str(), 1.0)).collect();
             let height = fitting(&texts, LINE_HEIGHT, shape);
-            let left = 2.0 * MARGIN * height / shape - 1.0;
-            write(
-                &mut marks,
-                &texts,
-                height,
-                shape,
-                DARK,
-                |_| left,
-                1.0 - 2.0 * MARGIN * height,
-            );
+            let left = |_| 2.0 * MARGIN * height / shape - 1.0;
+            let top = 1.0 - 2.0 * MARGIN * height;
+            write(&mut marks, &texts, height, shape, DARK, left, top);
         }
         if let Some(banner) = &self.banner {
             let texts = [
                 (banner.text.as_str(), 1.0),
                 (banner.note.as_str(), NOTE_HEIGHT),
             ];
-            let height = fitting(&texts, BANNER_HEIGHT, shape);
-            let top = (1.0 + NOTE_HEIGHT) * height;
-            write(
-                &mut marks,
-                &texts,
-                height,
-                shape,
-                DARKEST,
-                |wide| -0.5 * wide,
-                top,
-            );
+            let top = (1.0 + NOTE_HEIGHT) * fitting(&texts, BANNER_HEIGHT, shape);
+            marks.extend(centred(&texts, BANNER_HEIGHT, shape, top));
         }
         marks.truncate(MAX_MARKS);
         marks

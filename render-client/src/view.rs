@@ -381,20 +381,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn corners_of_the_screen_are_corners_of_the_picture_from_any_eye(eye in eye()) {
-            for screen in [wall(), table()] {
-                let clip = screen.clip_from_workbench(&eye, &PLANES).expect("in front");
-                for (across, upward) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-                    let seen = project(&clip, &screen.point(across, upward)).expect("in front");
-                    prop_assert!((seen.x - (2.0 * across - 1.0)).abs() < ROUNDING);
-                    prop_assert!((seen.y - (2.0 * upward - 1.0)).abs() < ROUNDING);
-                }
-            }
-        }
-
-        #[test]
         fn a_point_appears_where_its_line_of_sight_pierces_the_screen(
-            eye in eye(), across in 0.0..1.0f64, upward in 0.0..1.0f64, beyond in 0.2..3.0f64,
+            eye in eye(), across in 0.0..=1.0f64, upward in 0.0..=1.0f64, beyond in 0.2..3.0f64,
         ) {
             for screen in [wall(), table()] {
                 let clip = screen.clip_from_workbench(&eye, &PLANES).expect("in front");
@@ -403,39 +391,6 @@ mod tests {
                 prop_assert!((seen.x - (2.0 * across - 1.0)).abs() < ROUNDING);
                 prop_assert!((seen.y - (2.0 * upward - 1.0)).abs() < ROUNDING);
             }
-        }
-
-        #[test]
-        fn a_line_of_sight_through_the_common_edge_meets_it_at_one_place_on_both_screens(
-            eye in eye(), across in 0.0..1.0f64, beyond in 0.3..3.0f64,
-        ) {
-            let edge = wall().point(across, 0.0);
-            let point = eye + (edge - eye) * beyond;
-            let on_wall = wall().clip_from_workbench(&eye, &PLANES).expect("in front");
-            let on_table = table().clip_from_workbench(&eye, &PLANES).expect("in front");
-            let on_wall = project(&on_wall, &point).expect("in front");
-            let on_table = project(&on_table, &point).expect("in front");
-            prop_assert!((on_wall.x - on_table.x).abs() < ROUNDING);
-            prop_assert!((on_wall.y + 1.0).abs() < ROUNDING);
-            prop_assert!((on_table.y - 1.0).abs() < ROUNDING);
-        }
-
-        #[test]
-        fn disparity_is_that_of_similar_triangles(
-            x in -0.5..0.5f64, depth in -0.5..2.0f64, z in 0.2..1.0f64, separation in 0.05..0.07f64,
-        ) {
-            // A head looking straight at the wall from 1.2 m; a point `depth` behind the wall.
-            let from_eye = 1.2;
-            let head = Isometry3::translation(0.0, 0.6 - from_eye, 0.6);
-            let eyes = Eyes::of_head(&head, separation);
-            let point = Point3::new(x, 0.6 + depth, z);
-            let seen = |eye| {
-                let clip = wall().clip_from_workbench(&eyes.position(eye), &PLANES).expect("in front");
-                project(&clip, &point).expect("in front").x
-            };
-            let on_screen = separation * depth / (from_eye + depth); // m, right minus left
-            let expected = on_screen / (0.5 * wall().width());
-            prop_assert!((seen(Eye::Right) - seen(Eye::Left) - expected).abs() < ROUNDING);
         }
 
         #[test]

@@ -213,7 +213,7 @@ fn within(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use taut_screens::{Across, OutputNode, Target};
+    use crate::correction::tests::surface;
 
     fn wall() -> Screen {
         let corners = [[-0.9, 0.0, 0.0], [0.9, 0.0, 0.0], [-0.9, 0.0, 1.2]].map(Point3::from);
@@ -222,29 +222,10 @@ mod tests {
 
     /// A wall that bulges away from the viewer.
     fn bulge() -> Surface {
-        let (columns, rows) = (41, 21);
-        let node = |i: usize| {
-            let (s, t) = (
-                (i % columns) as f32 / (columns - 1) as f32,
-                (i / columns) as f32 / (rows - 1) as f32,
-            );
-            OutputNode {
-                place: [s, t],
-                target: [
-                    1.8 * s - 0.9,
-                    0.3 * (s * std::f32::consts::PI).sin(),
-                    1.2 * t,
-                ],
-                share: 1.0,
-            }
-        };
-        Surface::of(&OutputMesh {
-            target: Target::Surface,
-            across: Across::Width,
-            columns,
-            rows,
-            nodes: (0..columns * rows).map(node).collect(),
-        })
+        Surface::of(&surface((41, 21), |s, t| {
+            let deep = 0.3 * (s * std::f32::consts::PI).sin();
+            [1.8 * s - 0.9, deep, 1.2 * t]
+        }))
     }
 
     #[test]
