@@ -1,6 +1,6 @@
 //! Draws without a window: to PNG files, or to nowhere to see how a node keeps up.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use taut_proto::scene::Show;
@@ -40,10 +40,7 @@ pub(crate) fn run(
     plan: &Plan,
 ) -> Result<Ended, RenderError> {
     if let Some((folder, _)) = &plan.out {
-        std::fs::create_dir_all(folder).map_err(|error| RenderError::Picture {
-            path: folder.clone(),
-            reason: error.to_string(),
-        })?;
+        std::fs::create_dir_all(folder).map_err(|error| not_written(folder, &error))?;
     }
     let start = Instant::now();
     let mut drawing = Drawing {
@@ -83,7 +80,7 @@ pub(crate) fn run(
 }
 
 /// What tells a picture from the one before: the time of its state, ns, whether that is stale, and what is said of the link.
-type Drawn = (u64, bool, Option<u64>);
+pub(crate) type Drawn = (u64, bool, Option<u64>);
 
 /// Drawing under way.
 struct Drawing<'a> {
@@ -185,9 +182,13 @@ impl Drawing<'_> {
 
     /// Hands on what is drawn; why drawing has ended, if it has.
     fn finish_frame(&mut self, latched: &Latched) -> Result<Option<Ended>, RenderError> {
-        show_server(self.session, self.canvas, latched);
-        tell(self.session, self.canvas);
-        if finish(self.canvas, self.statistics, self.plan)? {
+        let (session, canvas) = (&mut *self.session, &*self.canvas);
+        let eyes = eyes_of(canvas.stage(), latched);
+        session.give_pictures(|shown_ns| canvas.frame(&eyes, shown_ns), || canvas.parts());
+        session.tell_first_frame(|| (canvas.pictures(), canvas.gpu().summary().to_string()));
+        let frames = self.statistics.frames;
+        write_pictures(canvas, self.plan, frames)?;
+        if self.plan.frames.is_some_and(|most| frames >= most) {
             return Ok(Some(Ended::Frames));
         }
         self.schedule();
@@ -211,23 +212,6 @@ impl Drawing<'_> {
     }
 }
 
-/// Gives the server the pictures of this frame, if it wants them.
-fn show_server(session: &Session, canvas: &Canvas, latched: &Latched) {
-    let eyes = eyes_of(canvas.stage(), latched);
-    session.give_pictures(|shown_ns| canvas.frame(&eyes, shown_ns), || canvas.parts());
-}
-
-fn tell(session: &mut Session, canvas: &Canvas) {
-    session.tell_first_frame(|| (canvas.pictures(), canvas.gpu().summary().to_string()));
-}
-
-/// Writes the frame's pictures; whether it was the last.
-fn finish(canvas: &Canvas, statistics: &Statistics, plan: &Plan) -> Result<bool, RenderError> {
-    write_pictures(canvas, plan, statistics.frames)?;
-    let enough = |frames| statistics.frames >= frames;
-    Ok(plan.frames.is_some_and(enough))
-}
-
 /// What the screen says of the link, to the second: a picture is drawn again when that changes.
 pub(crate) fn shown(link: LinkHealth) -> Option<u64> {
     match link {
@@ -244,12 +228,17 @@ fn write_pictures(canvas: &Canvas, plan: &Plan, frame: u64) -> Result<(), Render
     };
     for (name, image) in canvas.images()? {
         let path = folder.join(picture_file(node, &format!("{name}-{frame:05}.png")));
-        image.save(&path).map_err(|error| RenderError::Picture {
-            path: path.clone(),
-            reason: error.to_string(),
-        })?;
+        let saved = image.save(&path);
+        saved.map_err(|error| not_written(&path, &error))?;
     }
     Ok(())
+}
+
+fn not_written(path: &Path, error: &dyn std::error::Error) -> RenderError {
+    RenderError::Picture {
+        path: path.to_path_buf(),
+        reason: error.to_string(),
+    }
 }
 
 /// The file of a node's `picture`. The first `-` ends the node's name, in which there is none, so that no two nodes write one file.

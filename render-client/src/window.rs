@@ -24,7 +24,7 @@ use crate::canvas::eyes_of;
 use crate::cli::DrawnWith;
 use crate::error::RenderError;
 use crate::hand::Hand;
-use crate::headless::shown;
+use crate::headless::{Drawn, shown};
 use crate::hud::Overlay;
 use crate::monitor::Places;
 use crate::mouse::{Mouse, Pointed};
@@ -125,9 +125,6 @@ struct App<'a> {
     last_drawn: Option<Drawn>,
     result: Option<Result<Ended, RenderError>>,
 }
-
-/// What distinguishes pictures: sample time of the state, whether it is stale, and what the screen says of the link.
-type Drawn = (u64, bool, Option<u64>);
 
 /// A frame to be drawn.
 struct Due {
