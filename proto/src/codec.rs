@@ -394,6 +394,19 @@ impl<T: Wire> Wire for Option<T> {
     }
 }
 
+impl<T: Wire, const N: usize> Wire for ArrayVec<T, N> {
+    const IS_NUMBER: bool = T::IS_NUMBER;
+    fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
+        const { assert!(N <= u8::MAX as usize, "its length is one byte") };
+        to.put(self.len() as u8)?;
+        self.iter().try_for_each(|element| element.write(to))
+    }
+    fn read(from: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        let len = from.take()?;
+        read_elements(from, len)
+    }
+}
+
 fn count(what: &'static str, len: usize, max: usize) -> Result<u16, EncodeError> {
     match u16::try_from(len) {
         Ok(count) if len <= max => Ok(count),
@@ -422,10 +435,12 @@ pub(crate) fn read_elements<T: Wire, const N: usize>(
 }
 
 /// Declares a message: its fields in the order of their bytes, each number with its range behind `=>`. A number without one does not compile.
+/// Behind `check`: the method that refuses what was read where fields contradict each other.
 macro_rules! wire_struct {
     (
         $(#[$about:meta])*
         pub struct $name:ident { $( $(#[$what:meta])* pub $field:ident: $kind:ty $(=> $bounds:ident)? ),* $(,)? }
+        $(check $check:ident)?
     ) => {
         $(#[$about])*
         pub struct $name { $( $(#[$what])* pub $field: $kind, )* }
@@ -442,7 +457,9 @@ macro_rules! wire_struct {
                 Ok(())
             }
             fn read(from: &mut $crate::codec::Reader<'_>) -> Result<Self, $crate::DecodeError> {
-                Ok(Self { $( $field: $crate::codec::wire_struct!(@read $name from $field $($bounds)?), )* })
+                let read = Self { $( $field: $crate::codec::wire_struct!(@read $name from $field $($bounds)?), )* };
+                $( read.$check()?; )?
+                Ok(read)
             }
         }
     };
@@ -469,19 +486,35 @@ pub(crate) fn write_plain<T: Wire>(value: &T, to: &mut Writer<'_>) -> Result<(),
     value.write(to)
 }
 
-/// Layout of an enum without fields: one byte.
-macro_rules! wire_tag {
-    ($name:ty, $what:literal { $($variant:ident = $tag:literal),* $(,)? }) => {
-        impl $crate::codec::Wire for $name {
-            fn write(&self, to: &mut $crate::codec::Writer<'_>) -> Result<(), $crate::EncodeError> {
-                let tag: u8 = match self { $( Self::$variant => $tag, )* };
-                tag.write(to)
+/// The number of each variant of an enum without fields.
+macro_rules! codes {
+    ($name:ty, $what:literal { $($variant:ident = $code:literal),* $(,)? }) => {
+        impl $name {
+            pub(crate) const fn code(self) -> u8 {
+                match self { $( Self::$variant => $code, )* }
             }
-            fn read(from: &mut $crate::codec::Reader<'_>) -> Result<Self, $crate::DecodeError> {
-                match u8::read(from)? {
-                    $( $tag => Ok(Self::$variant), )*
+            pub(crate) fn from_code(code: u8) -> Result<Self, $crate::DecodeError> {
+                match code {
+                    $( $code => Ok(Self::$variant), )*
                     tag => Err($crate::DecodeError::UnknownTag { what: $what, tag }),
                 }
+            }
+        }
+    };
+}
+pub(crate) use codes;
+
+/// Layout of an enum without fields: one byte, its number.
+macro_rules! wire_tag {
+    ($name:ty, $what:literal { $($codes:tt)* }) => {
+        $crate::codec::codes!($name, $what { $($codes)* });
+
+        impl $crate::codec::Wire for $name {
+            fn write(&self, to: &mut $crate::codec::Writer<'_>) -> Result<(), $crate::EncodeError> {
+                self.code().write(to)
+            }
+            fn read(from: &mut $crate::codec::Reader<'_>) -> Result<Self, $crate::DecodeError> {
+                <$name>::from_code(u8::read(from)?)
             }
         }
     };

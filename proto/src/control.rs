@@ -205,57 +205,47 @@ wire_struct! {
     }
 }
 
-/// Everything that is said on a control stream.
-#[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "each variant is documented at its struct")]
-#[allow(
-    clippy::large_enum_variant,
-    reason = "the large one is the scene, made once per join"
-)]
-pub enum ControlMessage {
-    Refused(Refusal),
-    Hello(Hello),
-    Welcome(Welcome),
-    Scene(SceneDescription),
-    Coupling(CouplingOffer),
-    MeshRequest(MeshRequest),
-    MeshHeader(MeshHeader),
-    Stats(ClientStats),
-    Log(LogEvent),
-    Bye(Bye),
-    Arm(ArmRequest),
-    Group(Group),
-    Events(EventBatch),
-    StatesBy(StatesBy),
-    PictureRequest(PictureRequest),
-    PictureHeader(PictureHeader),
-    NoPicture(NoPicture),
+/// Declares all messages of a control stream, each with its tag.
+macro_rules! control_messages {
+    ($($variant:ident($body:ty) = $tag:literal),* $(,)?) => {
+        /// Everything that is said on a control stream.
+        #[derive(Clone, Debug, PartialEq)]
+        #[allow(missing_docs, reason = "each variant is documented at its struct")]
+        #[allow(clippy::large_enum_variant, reason = "the large one is the scene, made once per join")]
+        pub enum ControlMessage { $( $variant($body), )* }
+
+        impl ControlMessage {
+            /// Name for error texts.
+            pub fn name(&self) -> &'static str {
+                match self { $( ControlMessage::$variant(_) => stringify!($variant), )* }
+            }
+        }
+
+        impl Wire for ControlMessage {
+            fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
+                match self { $( ControlMessage::$variant(body) => { let tag: u8 = $tag; tag.write(to)?; body.write(to) } )* }
+            }
+            fn read(from: &mut Reader<'_>) -> Result<ControlMessage, DecodeError> {
+                match u8::read(from)? {
+                    $( $tag => Ok(ControlMessage::$variant(<$body>::read(from)?)), )*
+                    tag => Err(DecodeError::UnknownTag { what: "message", tag }),
+                }
+            }
+        }
+    };
+}
+control_messages! {
+    Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
+    MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
+    Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10, Group(Group) = 14,
+    Events(EventBatch) = 15, StatesBy(StatesBy) = 16,
+    PictureRequest(PictureRequest) = 17, PictureHeader(PictureHeader) = 18, NoPicture(NoPicture) = 19,
 }
 
-impl ControlMessage {
-    /// Name for error texts.
-    pub fn name(&self) -> &'static str {
-        match self {
-            ControlMessage::Refused(_) => "Refused",
-            ControlMessage::Hello(_) => "Hello",
-            ControlMessage::Welcome(_) => "Welcome",
-            ControlMessage::Scene(_) => "Scene",
-            ControlMessage::Coupling(_) => "Coupling",
-            ControlMessage::MeshRequest(_) => "MeshRequest",
-            ControlMessage::MeshHeader(_) => "MeshHeader",
-            ControlMessage::Stats(_) => "Stats",
-            ControlMessage::Log(_) => "Log",
-            ControlMessage::Bye(_) => "Bye",
-            ControlMessage::Arm(_) => "Arm",
-            ControlMessage::Group(_) => "Group",
-            ControlMessage::Events(_) => "Events",
-            ControlMessage::StatesBy(_) => "StatesBy",
-            ControlMessage::PictureRequest(_) => "PictureRequest",
-            ControlMessage::PictureHeader(_) => "PictureHeader",
-            ControlMessage::NoPicture(_) => "NoPicture",
-        }
-    }
+const REFUSED_TAG: u8 = 0;
+const HELLO_TAG: u8 = 1;
 
+impl ControlMessage {
     /// The framed message, in the newest version.
     pub fn to_frame(&self) -> Result<Vec<u8>, EncodeError> {
         self.to_frame_of(PROTOCOL_VERSION)
@@ -325,32 +315,6 @@ impl ControlMessage {
             }),
         }
     }
-}
-
-const REFUSED_TAG: u8 = 0;
-const HELLO_TAG: u8 = 1;
-
-macro_rules! wire_messages {
-    ($($variant:ident($body:ty) = $tag:literal),* $(,)?) => {
-        impl Wire for ControlMessage {
-            fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
-                match self { $( ControlMessage::$variant(body) => { let tag: u8 = $tag; tag.write(to)?; body.write(to) } )* }
-            }
-            fn read(from: &mut Reader<'_>) -> Result<ControlMessage, DecodeError> {
-                match u8::read(from)? {
-                    $( $tag => Ok(ControlMessage::$variant(<$body>::read(from)?)), )*
-                    tag => Err(DecodeError::UnknownTag { what: "message", tag }),
-                }
-            }
-        }
-    };
-}
-wire_messages! {
-    Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
-    MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
-    Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10, Group(Group) = 14,
-    Events(EventBatch) = 15, StatesBy(StatesBy) = 16,
-    PictureRequest(PictureRequest) = 17, PictureHeader(PictureHeader) = 18, NoPicture(NoPicture) = 19,
 }
 
 wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });

@@ -12,7 +12,7 @@
 //! | 20     | length   | 2     | payload bytes, without the tag                           |
 //! | 22     | reserved | 2     | 0                                                        |
 
-use crate::{DecodeError, version::MAGIC};
+use crate::{DecodeError, codec::codes, version::MAGIC};
 
 /// Bytes of the header.
 pub const HEADER_BYTES: usize = 24;
@@ -60,53 +60,10 @@ pub enum Kind {
     PassedForce,
 }
 
-impl Kind {
-    fn code(self) -> u8 {
-        match self {
-            Kind::Hot => 0,
-            Kind::EventAck => 2,
-            Kind::TimeRequest => 3,
-            Kind::TimeResponse => 4,
-            Kind::Arrive => 5,
-            Kind::Release => 6,
-            Kind::Heartbeat => 7,
-            Kind::Input => 8,
-            Kind::Wrench => 9,
-            Kind::Constraints => 10,
-            Kind::Head => 11,
-            Kind::Confirm => 12,
-            Kind::PathChallenge => 13,
-            Kind::PathResponse => 14,
-            Kind::Force => 15,
-            Kind::PassedForce => 16,
-        }
-    }
-
-    fn from_code(tag: u8) -> Result<Kind, DecodeError> {
-        match tag {
-            0 => Ok(Kind::Hot),
-            2 => Ok(Kind::EventAck),
-            3 => Ok(Kind::TimeRequest),
-            4 => Ok(Kind::TimeResponse),
-            5 => Ok(Kind::Arrive),
-            6 => Ok(Kind::Release),
-            7 => Ok(Kind::Heartbeat),
-            8 => Ok(Kind::Input),
-            9 => Ok(Kind::Wrench),
-            10 => Ok(Kind::Constraints),
-            11 => Ok(Kind::Head),
-            12 => Ok(Kind::Confirm),
-            13 => Ok(Kind::PathChallenge),
-            14 => Ok(Kind::PathResponse),
-            15 => Ok(Kind::Force),
-            16 => Ok(Kind::PassedForce),
-            tag => Err(DecodeError::UnknownTag {
-                what: "datagram kind",
-                tag,
-            }),
-        }
-    }
-}
+codes!(Kind, "datagram kind" {
+    Hot = 0, EventAck = 2, TimeRequest = 3, TimeResponse = 4, Arrive = 5, Release = 6, Heartbeat = 7, Input = 8, Wrench = 9,
+    Constraints = 10, Head = 11, Confirm = 12, PathChallenge = 13, PathResponse = 14, Force = 15, PassedForce = 16,
+});
 
 /// The header's fields that vary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

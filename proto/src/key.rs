@@ -114,7 +114,7 @@ impl ClusterKey {
 
     /// The secret that a client of this role, name and grant must have.
     pub fn join_secret(&self, role: Role, node: &str, grant: Grant) -> JoinSecret {
-        let role = [role.number()];
+        let role = [role.code()];
         let derived = match grant {
             Grant::Master => self.derive(&[MASTER_LABEL]),
             Grant::Node { issue } => {

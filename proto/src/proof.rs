@@ -163,7 +163,7 @@ impl JoinSecret {
 
 /// Everything before the node name has a fixed length: no two inputs give one message.
 fn message(label: &[u8], exporter: &[u8; EXPORTER_BYTES], claim: Claim<'_>) -> Vec<u8> {
-    let role = [claim.role.number(), claim.grant.tag()];
+    let role = [claim.role.code(), claim.grant.tag()];
     let issue = claim.grant.issue().to_le_bytes();
     [label, exporter, &role, &issue, claim.node.as_bytes()].concat()
 }

@@ -121,14 +121,10 @@ impl Role {
 
     /// Its name in files and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Role::Render => "render",
-            Role::Device => "device",
-            Role::Tracker => "tracker",
-            Role::Force => "force",
-            Role::Operator => "operator",
-            Role::Observer => "observer",
-        }
+        let mut named = Role::NAMED.into_iter();
+        named
+            .find(|(_, role)| *role == self)
+            .map_or("", |(name, _)| name)
     }
 
     /// What it is to people.
@@ -173,18 +169,6 @@ impl Role {
                 per_second: 200,
                 burst: 200,
             },
-        }
-    }
-
-    /// Number in proofs, secrets and on the wire.
-    pub(crate) const fn number(self) -> u8 {
-        match self {
-            Role::Render => 0,
-            Role::Device => 1,
-            Role::Observer => 2,
-            Role::Operator => 3,
-            Role::Tracker => 4,
-            Role::Force => 5,
         }
     }
 
@@ -235,4 +219,5 @@ impl FromStr for Role {
     }
 }
 
+// The same numbers are in proofs and secrets.
 wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3, Tracker = 4, Force = 5 });

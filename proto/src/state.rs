@@ -14,7 +14,7 @@
 
 use crate::{
     DecodeError, EncodeError, PoseF32,
-    codec::{Reader, Wire, Writer, encode_into, read_elements, wire_struct},
+    codec::{Reader, Wire, Writer, codes, encode_into, read_elements, wire_struct},
     header::MAX_PAYLOAD_BYTES,
     octahedral::{normal_from_octahedral, octahedral_from_normal},
     range::{
@@ -259,29 +259,7 @@ pub fn payload_hash(payload: &[u8]) -> u64 {
     u64::from_le_bytes(first)
 }
 
-impl RunState {
-    fn code(self) -> u8 {
-        match self {
-            RunState::Waiting => 0,
-            RunState::Running => 1,
-            RunState::Paused => 2,
-            RunState::Fault => 3,
-        }
-    }
-
-    fn from_code(tag: u8) -> Result<RunState, DecodeError> {
-        match tag {
-            0 => Ok(RunState::Waiting),
-            1 => Ok(RunState::Running),
-            2 => Ok(RunState::Paused),
-            3 => Ok(RunState::Fault),
-            tag => Err(DecodeError::UnknownTag {
-                what: "run state",
-                tag,
-            }),
-        }
-    }
-}
+codes!(RunState, "run state" { Waiting = 0, Running = 1, Paused = 2, Fault = 3 });
 
 const SAMPLE_TIME: Number = Number::new("HotState.sample_time_ns", TIME);
 const TICK: Number = Number::new("HotState.tick", COUNT);
