@@ -9,6 +9,7 @@ use crate::{
     codec::{Reader, Wire, Writer},
     picture::{MAX_PICTURE_BYTES, MAX_PICTURE_EDGE},
 };
+use arrayvec::ArrayVec;
 
 /// Least and most of a number, with its unit and its sense.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -208,6 +209,12 @@ macro_rules! in_bounds {
 in_bounds!(u8, u16, u32, u64, i32, f32, f64);
 
 impl<T: InBounds, const N: usize> InBounds for [T; N] {
+    fn are_within(&self, bounds: &Bounds) -> bool {
+        self.iter().all(|value| value.are_within(bounds))
+    }
+}
+
+impl<T: InBounds, const N: usize> InBounds for ArrayVec<T, N> {
     fn are_within(&self, bounds: &Bounds) -> bool {
         self.iter().all(|value| value.are_within(bounds))
     }

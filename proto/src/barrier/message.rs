@@ -3,9 +3,9 @@
 //! Fullest RELEASE: 43 bytes and two for each of 32 members, then the state of 996: 1103 of [`crate::header::MAX_PAYLOAD_BYTES`].
 
 use crate::{
-    DecodeError, EncodeError, HotState,
-    codec::{Reader, Wire, Writer, read_elements, wire_struct},
-    range::{BITS, COUNT, COUNT_32, NAME, NODE_PERIOD, Number, PERIOD, SENDER, TIME},
+    DecodeError, HotState,
+    codec::wire_struct,
+    range::{BITS, COUNT, COUNT_32, NAME, NODE_PERIOD, PERIOD, SENDER, TIME},
 };
 use arrayvec::ArrayVec;
 
@@ -48,28 +48,31 @@ wire_struct! {
     }
 }
 
-/// What a RELEASE says beside the state.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ReleaseHead {
-    /// Number of the master's term: 1 is the server's, each successor adds one. Of two masters the higher term is followed, then the lower
-    /// `master`.
-    pub term: u64,
-    /// Session number of the master; 0 is the server.
-    pub master: u16,
-    /// The frame that is to be shown; strictly increasing within a term.
-    pub frame: u64,
-    /// When: session time, ns; 0 on receipt.
-    pub swap_ns: u64,
-    /// Time between two frames, µs.
-    pub period_us: u32,
-    /// Largest difference between the swap calls of the newest frame that all members told of, ns.
-    pub skew_ns: u32,
-    /// Bit i: the master waits for member i.
-    pub waited: u32,
-    /// Bit i: member i did not arrive at this frame in time.
-    pub late: u32,
-    /// Session numbers of the nodes that take part, ascending.
-    pub members: ArrayVec<u16, MAX_MEMBERS>,
+wire_struct! {
+    /// What a RELEASE says beside the state.
+    #[derive(Clone, Debug, Default, PartialEq, Eq)]
+    pub struct ReleaseHead {
+        /// Number of the master's term: 1 is the server's, each successor adds one. Of two masters the higher term is followed, then the lower
+        /// `master`.
+        pub term: u64 => COUNT,
+        /// Session number of the master; 0 is the server.
+        pub master: u16 => SENDER,
+        /// The frame that is to be shown; strictly increasing within a term.
+        pub frame: u64 => COUNT,
+        /// When: session time, ns; 0 on receipt.
+        pub swap_ns: u64 => TIME,
+        /// Time between two frames, µs.
+        pub period_us: u32 => PERIOD,
+        /// Largest difference between the swap calls of the newest frame that all members told of, ns.
+        pub skew_ns: u32 => COUNT_32,
+        /// Bit i: the master waits for member i.
+        pub waited: u32 => BITS,
+        /// Bit i: member i did not arrive at this frame in time.
+        pub late: u32 => BITS,
+        /// Session numbers of the nodes that take part, ascending.
+        pub members: ArrayVec<u16, MAX_MEMBERS> => NAME,
+    }
+    check is_consistent
 }
 
 wire_struct! {
@@ -99,74 +102,22 @@ impl ReleaseHead {
         self.place(session)
             .is_some_and(|place| self.waited >> place & 1 == 1)
     }
-}
 
-const TERM: Number = Number::new("ReleaseHead.term", COUNT);
-const MASTER: Number = Number::new("ReleaseHead.master", SENDER);
-const FRAME: Number = Number::new("ReleaseHead.frame", COUNT);
-const SWAP: Number = Number::new("ReleaseHead.swap_ns", TIME);
-const FRAME_PERIOD: Number = Number::new("ReleaseHead.period_us", PERIOD);
-const SKEW: Number = Number::new("ReleaseHead.skew_ns", COUNT_32);
-const MEMBER_BITS: Number = Number::new("ReleaseHead.waited, late", BITS);
-const MEMBER: Number = Number::new("ReleaseHead.members", NAME);
-
-impl ReleaseHead {
-    /// Its numbers and what each may be.
-    pub const NUMBERS: &'static [Number] = &[
-        TERM,
-        MASTER,
-        FRAME,
-        SWAP,
-        FRAME_PERIOD,
-        SKEW,
-        MEMBER_BITS,
-        MEMBER,
-    ];
-}
-
-impl Wire for ReleaseHead {
-    fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
-        TERM.write(&self.term, to)?;
-        MASTER.write(&self.master, to)?;
-        FRAME.write(&self.frame, to)?;
-        SWAP.write(&self.swap_ns, to)?;
-        FRAME_PERIOD.write(&self.period_us, to)?;
-        SKEW.write(&self.skew_ns, to)?;
-        MEMBER_BITS.write(&self.waited, to)?;
-        MEMBER_BITS.write(&self.late, to)?;
-        (self.members.len() as u8).write(to)?; // at most MAX_MEMBERS
-        self.members.iter().try_for_each(|member| member.write(to))
+    /// Whether it comes after `other`, if there is one.
+    pub(super) fn is_newer(&self, other: Option<&ReleaseHead>) -> bool {
+        let order = |head: &ReleaseHead| (head.rank(), head.frame);
+        other.is_none_or(|other| order(self) > order(other))
     }
 
-    fn read(from: &mut Reader<'_>) -> Result<ReleaseHead, DecodeError> {
-        let term = TERM.read(from)?;
-        let master = MASTER.read(from)?;
-        let frame = FRAME.read(from)?;
-        let swap_ns = SWAP.read(from)?;
-        let period_us = FRAME_PERIOD.read(from)?;
-        let skew_ns = SKEW.read(from)?;
-        let waited: u32 = MEMBER_BITS.read(from)?;
-        let late: u32 = MEMBER_BITS.read(from)?;
-        let count = Wire::read(from)?;
-        let members: ArrayVec<u16, MAX_MEMBERS> = read_elements(from, count)?;
-        // Nobody is waited for, or late, who is not there.
-        let of_nobody = u64::from(waited | late) >> members.len() != 0;
-        if of_nobody || members.windows(2).any(|pair| pair[0] >= pair[1]) {
+    /// Nobody is waited for, or late, who is not there.
+    fn is_consistent(&self) -> Result<(), DecodeError> {
+        let of_nobody = u64::from(self.waited | self.late) >> self.members.len() != 0;
+        if of_nobody || self.members.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err(DecodeError::Inconsistent {
                 what: "members of a frame",
             });
         }
-        Ok(ReleaseHead {
-            term,
-            master,
-            frame,
-            swap_ns,
-            period_us,
-            skew_ns,
-            waited,
-            late,
-            members,
-        })
+        Ok(())
     }
 }
 

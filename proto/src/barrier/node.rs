@@ -98,12 +98,7 @@ impl Node {
 
     /// Takes an authentic RELEASE in; whether it is newer than all before, so that its state is the one to draw next.
     pub fn release(&mut self, now_ns: u64, head: &ReleaseHead) -> bool {
-        let order = |head: &ReleaseHead| (head.rank(), head.frame);
-        if self
-            .newest
-            .as_ref()
-            .is_some_and(|newest| order(newest) >= order(head))
-        {
+        if !head.is_newer(self.newest.as_ref()) {
             return false;
         }
         self.newest = Some(head.clone());

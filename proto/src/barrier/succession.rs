@@ -94,12 +94,7 @@ impl Succession {
 
     /// An authentic RELEASE came, from whomever.
     pub fn release(&mut self, now_ns: u64, head: &ReleaseHead) {
-        let order = |head: &ReleaseHead| (head.rank(), head.frame);
-        if self
-            .newest
-            .as_ref()
-            .is_none_or(|newest| order(newest) < order(head))
-        {
+        if head.is_newer(self.newest.as_ref()) {
             self.newest = Some(head.clone());
             self.hear(now_ns);
         }
