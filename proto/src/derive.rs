@@ -3,6 +3,7 @@
 //! Source: RFC 5869. Extract runs once per secret, expand once per key; neither allocates.
 
 use ring::hkdf;
+use zeroize::Zeroizing;
 
 /// A secret from which any number of independent keys come; it is in none of them.
 pub(crate) struct Root(hkdf::Prk);
@@ -22,14 +23,14 @@ impl Root {
         Root(hkdf::Salt::new(hkdf::HKDF_SHA256, purpose).extract(secret))
     }
 
-    /// `N` bytes that belong to `numbers`, which have fixed lengths in every use of one root.
-    pub(crate) fn key<const N: usize>(&self, numbers: &[&[u8]]) -> [u8; N] {
+    /// `N` bytes that belong to `parts`, which have fixed lengths in every use of one root, but for the last.
+    pub(crate) fn key<const N: usize>(&self, parts: &[&[u8]]) -> Zeroizing<[u8; N]> {
         const { assert!(N <= 255 * 32, "the most that HKDF-SHA-256 gives") };
-        let mut key = [0; N];
+        let mut key = Zeroizing::new([0; N]);
         let filled = self
             .0
-            .expand(numbers, Bytes(N))
-            .and_then(|material| material.fill(&mut key));
+            .expand(parts, Bytes(N))
+            .and_then(|material| material.fill(&mut *key));
         match filled {
             Ok(()) => key,
             Err(_) => unreachable!("the length is below the limit"),

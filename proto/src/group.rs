@@ -93,7 +93,7 @@ wire_struct! {
 impl Group {
     /// The key material of `sender` in this generation.
     pub fn material(&self, sender: u16) -> [u8; KEY_MATERIAL_BYTES] {
-        Root::new(ROOT_PURPOSE, &self.secret.0)
+        *Root::new(ROOT_PURPOSE, &self.secret.0)
             .key(&[&sender.to_le_bytes(), &self.generation.to_le_bytes()])
     }
 

@@ -12,19 +12,17 @@
 use crate::{
     Role,
     credential::{Credential, Holder},
+    derive::Root,
     pin::ServerPin,
     proof::{Grant, JoinSecret},
     text::{hex, parse_hex},
 };
 use ring::{
-    hkdf::{HKDF_SHA256, KeyType, Prk, Salt},
     rand::SecureRandom,
     signature::{Ed25519KeyPair, KeyPair},
 };
 use std::fmt;
 use zeroize::{Zeroize, Zeroizing};
-
-pub use crate::proof::EXPORTER_BYTES;
 
 const KEY_BYTES: usize = 32;
 /// Domain of all derivations; the number goes up with their layout.
@@ -127,21 +125,6 @@ impl ClusterKey {
 
     /// The labels have no common beginning, role and issue have fixed lengths, the name comes last: no two inputs give one message.
     fn derive(&self, info: &[&[u8]]) -> Zeroizing<[u8; 32]> {
-        let prk: Prk = Salt::new(HKDF_SHA256, SALT).extract(&self.bytes);
-        let mut bytes = Zeroizing::new([0; 32]);
-        let filled = prk
-            .expand(info, Bytes32)
-            .and_then(|okm| okm.fill(&mut *bytes));
-        debug_assert!(filled.is_ok(), "32 bytes are within the limits of HKDF");
-        bytes
-    }
-}
-
-/// Length of what is derived.
-struct Bytes32;
-
-impl KeyType for Bytes32 {
-    fn len(&self) -> usize {
-        32
+        Root::new(SALT, &self.bytes).key(info)
     }
 }

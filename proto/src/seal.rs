@@ -92,7 +92,7 @@ struct GenerationKey {
 impl GenerationKey {
     /// About two microseconds, no allocation.
     fn of(root: &Root, generation: u64) -> GenerationKey {
-        let material: [u8; GENERATION_BYTES] = root.key(&[&generation.to_le_bytes()]);
+        let material = root.key::<GENERATION_BYTES>(&[&generation.to_le_bytes()]);
         let (key, salt) = material.split_at(16);
         let mut own_salt = [0; NONCE_LEN];
         own_salt.copy_from_slice(salt);

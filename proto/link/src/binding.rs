@@ -5,7 +5,7 @@
 use crate::LinkError;
 use taut_proto::{
     group::SERVER_SENDER,
-    key::EXPORTER_BYTES,
+    proof::EXPORTER_BYTES,
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
 };
 use zeroize::Zeroizing;
@@ -20,42 +20,27 @@ pub fn proof_binding(connection: &quinn::Connection) -> Result<[u8; EXPORTER_BYT
     Ok(bytes)
 }
 
-/// Hot-plane keys of the server's end of `session`.
-pub(crate) fn server_keys(
+/// Hot-plane keys of one end of `session`.
+pub(crate) fn hot_keys(
     connection: &quinn::Connection,
     version: u8,
     epoch: u32,
     session: u16,
+    at_server: bool,
 ) -> Result<(Sealer, Opener), LinkError> {
-    let (down, up) = hot_material(connection)?;
-    Ok((
-        Sealer::new(&down, epoch, SERVER_SENDER).speaking(version),
-        Opener::new(&up, epoch, session).speaking(version),
-    ))
-}
-
-/// Hot-plane keys of the client's end of `session`.
-pub(crate) fn client_keys(
-    connection: &quinn::Connection,
-    version: u8,
-    epoch: u32,
-    session: u16,
-) -> Result<(Sealer, Opener), LinkError> {
-    let (down, up) = hot_material(connection)?;
-    Ok((
-        Sealer::new(&up, epoch, session).speaking(version),
-        Opener::new(&down, epoch, SERVER_SENDER).speaking(version),
-    ))
-}
-
-type Material = Zeroizing<[u8; KEY_MATERIAL_BYTES]>;
-
-/// Server to client, client to server.
-fn hot_material(connection: &quinn::Connection) -> Result<(Material, Material), LinkError> {
     let mut both = Zeroizing::new([[0; KEY_MATERIAL_BYTES]; 2]);
     export(connection, both.as_flattened_mut(), HOT_LABEL)?;
-    let [down, up] = both.map(Zeroizing::new);
-    Ok((down, up))
+    let [down, up] = &*both;
+    let (server, client) = ((down, SERVER_SENDER), (up, session));
+    let [sent, heard] = if at_server {
+        [server, client]
+    } else {
+        [client, server]
+    };
+    Ok((
+        Sealer::new(sent.0, epoch, sent.1).speaking(version),
+        Opener::new(heard.0, epoch, heard.1).speaking(version),
+    ))
 }
 
 fn export(connection: &quinn::Connection, into: &mut [u8], label: &[u8]) -> Result<(), LinkError> {

@@ -66,8 +66,8 @@ pub(crate) async fn connect_with(
         send,
         recv,
     } = joined;
-    let (sealer, opener) =
-        binding::client_keys(&connection, welcome.version, welcome.epoch, welcome.session)?;
+    let (version, epoch, session) = (welcome.version, welcome.epoch, welcome.session);
+    let (sealer, opener) = binding::hot_keys(&connection, version, epoch, session, false)?;
     let path = match options.transport {
         Transport::QuicDatagram => Path::Quic,
         Transport::Udp => Path::udp(SocketAddr::new(

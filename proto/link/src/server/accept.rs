@@ -241,7 +241,7 @@ fn admit(
     let now_ns = shared.clock.now_ns();
     let Admission { session, replaced } =
         shared.sessions.admit(name, hello.role, now_ns, |number| {
-            let keys = binding::server_keys(connection, version, shared.epoch, number)
+            let keys = binding::hot_keys(connection, version, shared.epoch, number, true)
                 .map_err(|error| error.to_string())?;
             let admitted = Admitted {
                 number,
