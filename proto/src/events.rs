@@ -121,17 +121,11 @@ impl EventOutbox {
             .count();
         let start = self.kept.len() - fresh;
         let full = self.kept.len() == MAX_KEPT;
-        let after = match self.kept.front() {
-            Some(first) if start == 0 && full => {
-                let before = first.id.wrapping_sub(1);
-                if is_newer(before, after) {
-                    before
-                } else {
-                    after
-                }
-            }
-            _ => after,
-        };
+        let oldest = self.kept.front().filter(|_| start == 0 && full);
+        let before = oldest.map(|first| first.id.wrapping_sub(1));
+        let after = before
+            .filter(|before| is_newer(*before, after))
+            .unwrap_or(after);
         EventBatch {
             after,
             records: self.kept.range(start..).take(MAX_BATCH).copied().collect(),

@@ -74,13 +74,6 @@ pub trait Tracked: Default {
 
 impl Tracked for TokenBucket {}
 
-impl<K: Copy + Eq + Hash, V: Tracked> SourceTable<K, V> {
-    /// Room for `sets` × 4 keys.
-    pub fn new(sets: usize) -> SourceTable<K, V> {
-        SourceTable::with_hasher(sets, RandomState::new())
-    }
-}
-
 impl<K: Copy + Eq + Hash, V: Tracked, S: BuildHasher> SourceTable<K, V, S> {
     /// Room for `sets` × 4 keys, hashed by `hasher`.
     pub fn with_hasher(sets: usize, hasher: S) -> SourceTable<K, V, S> {

@@ -20,7 +20,7 @@ use crate::mesh_prefix::{
     LAYOUT_F64, LAYOUT_FINISH, LAYOUT_LOOKS, LAYOUT_NORMALS, LAYOUT_TEXTURES, PREFIX_BYTES, Prefix,
 };
 use crate::mesh_textures::Textures;
-use crate::{DecodeError, EncodeError};
+use crate::{DecodeError, EncodeError, text::hex};
 
 /// Most bytes of an encoded mesh: 4 million triangles.
 pub const MAX_MESH_BYTES: usize = 128 << 20;
@@ -45,9 +45,7 @@ impl MeshHash {
 
 impl std::fmt::Display for MeshHash {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.bytes
-            .iter()
-            .try_for_each(|byte| write!(f, "{byte:02x}"))
+        f.write_str(&hex(&self.bytes))
     }
 }
 

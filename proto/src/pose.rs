@@ -31,6 +31,12 @@ wire_struct! {
     }
 }
 
+impl Default for PoseF32 {
+    fn default() -> PoseF32 {
+        PoseF32::IDENTITY
+    }
+}
+
 impl PoseF32 {
     /// At the origin, unrotated.
     pub const IDENTITY: PoseF32 = PoseF32 {

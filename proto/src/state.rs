@@ -33,7 +33,7 @@ pub const MAX_CONTACTS: usize = 8;
 pub const MAX_EVENTS: usize = 8;
 
 /// State of the workbench, published as one tuple so that all screens of a frame draw the same numbers.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct HotState {
     /// When the device was sampled: session time, ns.
     pub sample_time_ns: u64,
@@ -73,7 +73,7 @@ pub enum RunState {
 
 wire_struct! {
     /// The viewer's head.
-    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct HeadState {
         /// Head in the workbench frame: between the eyes, x to the right ear, y up, −z ahead.
         pub pose: PoseF32,
@@ -88,7 +88,7 @@ wire_struct! {
 
 wire_struct! {
     /// One god-object and the device that pulls it.
-    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct ToolState {
         /// God-object, in the scene frame: what is drawn.
         pub god_object: PoseF32,
@@ -197,48 +197,10 @@ pub const TOOL_FORCE_LIMITED: u16 = 1;
 /// [`ToolState::flags`]: the device is silent.
 pub const TOOL_DEVICE_SILENT: u16 = 2;
 
-impl Default for HeadState {
-    fn default() -> HeadState {
-        HeadState {
-            pose: PoseF32::IDENTITY,
-            age_us: 0,
-            eye_separation: 0.0,
-            flags: 0,
-        }
-    }
-}
-
-impl Default for ToolState {
-    fn default() -> ToolState {
-        ToolState {
-            god_object: PoseF32::IDENTITY,
-            device: PoseF32::IDENTITY,
-            linear_velocity: [0.0; 3],
-            angular_velocity: [0.0; 3],
-            force: [0.0; 3],
-            torque: [0.0; 3],
-            buttons: 0,
-            flags: 0,
-            id: 0,
-        }
-    }
-}
-
 impl HotState {
     /// A state with nothing in it.
     pub fn empty() -> HotState {
-        HotState {
-            sample_time_ns: 0,
-            tick: 0,
-            scene_revision: 0,
-            run: RunState::Waiting,
-            constraint_age_us: 0,
-            head: HeadState::default(),
-            tools: ArrayVec::new(),
-            bodies: ArrayVec::new(),
-            contacts: ArrayVec::new(),
-            events: ArrayVec::new(),
-        }
+        HotState::default()
     }
 
     /// Fingerprint of the state as sent: equal on all clients that draw the same state.

@@ -24,24 +24,14 @@ pub struct MemberStatus {
     pub session: u16,
     /// How far it is.
     pub state: NodeState,
-    /// Highest frame at which it arrived; 0 for none.
-    pub arrived: u64,
-    /// Frames at which it was waited for in vain.
-    pub lapses: u64,
-    /// Frames that it says were released and not shown.
-    pub missed: u32,
-    /// How long it took to draw its last frame, µs.
-    pub draw_us: u32,
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct Member {
     pub(super) session: u16,
     pub(super) state: NodeState,
+    /// Highest frame at which it arrived; 0 for none.
     pub(super) arrived: u64,
-    pub(super) lapses: u64,
-    pub(super) missed: u32,
-    pub(super) draw_us: u32,
     pub(super) period_us: u32,
     /// It told session time with its last frame.
     knows_time: bool,
@@ -63,9 +53,6 @@ impl Member {
             session,
             state: NodeState::Joining,
             arrived: 0,
-            lapses: 0,
-            missed: 0,
-            draw_us: 0,
             period_us: 0,
             knows_time: false,
             heard_ns: now_ns,
@@ -79,8 +66,6 @@ impl Member {
     /// Takes the arrival at a frame that it has not arrived at yet.
     pub(super) fn arrive(&mut self, arrive: &Arrive, in_time: bool) {
         self.arrived = arrive.frame;
-        self.missed = arrive.missed;
-        self.draw_us = arrive.draw_us;
         self.knows_time = arrive.ready_ns != 0;
         self.arrived_lately = true;
         self.on_time = if in_time { self.on_time + 1 } else { 0 };
@@ -131,7 +116,6 @@ impl Member {
         self.on_time = 0;
         if self.state == NodeState::Synced {
             self.state = NodeState::Late;
-            self.lapses += 1;
         }
     }
 
@@ -148,10 +132,6 @@ impl Member {
         MemberStatus {
             session: self.session,
             state: self.state,
-            arrived: self.arrived,
-            lapses: self.lapses,
-            missed: self.missed,
-            draw_us: self.draw_us,
         }
     }
 }
