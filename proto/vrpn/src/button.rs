@@ -39,10 +39,7 @@ impl ButtonChange {
                 button,
                 pressed: state != 0,
             }),
-            _ => Err(PayloadError {
-                bytes: payload.len(),
-                expected: "change of a button",
-            }),
+            _ => Err(PayloadError::of(payload, "change of a button")),
         }
     }
 
@@ -62,10 +59,7 @@ impl ButtonStates {
     /// # Errors
     /// [`PayloadError`] for a count below zero, above [`MAX_BUTTONS`] or beyond the payload.
     pub fn decode(payload: &[u8]) -> Result<Self, PayloadError> {
-        let error = PayloadError {
-            bytes: payload.len(),
-            expected: "state of buttons",
-        };
+        let error = PayloadError::of(payload, "state of buttons");
         let mut fields = Fields(payload);
         let count = fields.i32().ok_or(error)?;
         if !(0..=MAX_BUTTONS).contains(&count) {

@@ -15,7 +15,7 @@ use std::net::SocketAddrV4;
 use crate::PayloadError;
 use crate::button::{self, ButtonChange, ButtonStates};
 use crate::cookie::{CookieError, Version, cookie};
-use crate::description;
+use crate::description::{self, learn};
 use crate::force::{self, ForceReport, SurfaceContactReport};
 use crate::message::{Header, Message, MessageError, Stamp, append, first};
 use crate::stream::{Part, receive};
@@ -25,15 +25,15 @@ use crate::tracker::{self, PoseReport, VelocityReport};
 pub const MAX_LISTED_SENDERS: usize = 64;
 
 /// Types that this side understands, in the order of [`Kind`].
-const TYPES: [&str; 8] = [
-    tracker::POSE,
-    tracker::VELOCITY,
-    button::CHANGE,
-    button::STATES,
-    "vrpn_Base ping_message",
-    "vrpn_Base pong_message",
-    force::FORCE,
-    force::SCP,
+const TYPES: [(Kind, &str); 8] = [
+    (Kind::Pose, tracker::POSE),
+    (Kind::Velocity, tracker::VELOCITY),
+    (Kind::Change, button::CHANGE),
+    (Kind::States, button::STATES),
+    (Kind::Ping, "vrpn_Base ping_message"),
+    (Kind::Pong, "vrpn_Base pong_message"),
+    (Kind::Force, force::FORCE),
+    (Kind::SurfaceContact, force::SCP),
 ];
 
 /// Which of [`TYPES`].
@@ -48,17 +48,6 @@ enum Kind {
     Force,
     SurfaceContact,
 }
-
-const KINDS: [Kind; 8] = [
-    Kind::Pose,
-    Kind::Velocity,
-    Kind::Change,
-    Kind::States,
-    Kind::Ping,
-    Kind::Pong,
-    Kind::Force,
-    Kind::SurfaceContact,
-];
 
 /// What came from the server.
 #[derive(Clone, Debug, PartialEq)]
@@ -188,8 +177,8 @@ impl Client {
             description::append_udp(&mut self.outbound, address);
         }
         description::append_name(&mut self.outbound, description::SENDER, 0, &self.device);
-        for (number, name) in TYPES.iter().enumerate() {
-            description::append_name(&mut self.outbound, description::TYPE, number as i32, name);
+        for (kind, name) in TYPES {
+            description::append_name(&mut self.outbound, description::TYPE, kind as i32, name);
         }
         self.events.push_back(Event::Open(version));
     }
@@ -221,12 +210,10 @@ impl Client {
     }
 
     fn learn_sender(&mut self, number: i32, name: &str) {
-        if name == self.device {
-            if self.sender.replace(number).is_none() {
-                self.events.push_back(Event::Found);
-            }
-        } else if self.sender == Some(number) {
-            self.sender = None;
+        let known = self.sender.is_some();
+        learn(&mut self.sender, number, name == self.device);
+        if !known && self.sender.is_some() {
+            self.events.push_back(Event::Found);
         }
         if self.senders.len() < MAX_LISTED_SENDERS && !self.senders.iter().any(|s| s == name) {
             self.senders.push(name.to_owned());
@@ -234,12 +221,8 @@ impl Client {
     }
 
     fn learn_type(&mut self, number: i32, name: &str) {
-        for (known, kind) in self.numbers.iter_mut().zip(TYPES) {
-            if kind == name {
-                *known = Some(number);
-            } else if *known == Some(number) {
-                *known = None;
-            }
+        for (known, (_, of_kind)) in self.numbers.iter_mut().zip(TYPES) {
+            learn(known, number, of_kind == name);
         }
     }
 
@@ -252,7 +235,7 @@ impl Client {
             return Ok(()); // of another device, or of a type that nobody here wants
         };
         let payload = message.payload;
-        self.events.push_back(match KINDS[kind] {
+        self.events.push_back(match TYPES[kind].0 {
             Kind::Pose => Event::Pose(PoseReport::decode(payload)?, time),
             Kind::Velocity => Event::Velocity(VelocityReport::decode(payload)?, time),
             Kind::Change => Event::Button(ButtonChange::decode(payload)?),
@@ -292,37 +275,41 @@ mod tests {
         for (number, name) in [
             (4, tracker::POSE),
             (9, button::CHANGE),
-            (2, TYPES[5]),
-            (1, TYPES[4]),
+            (2, "vrpn_Base pong_message"),
+            (1, "vrpn_Base ping_message"),
         ] {
             description::append_name(&mut bytes, description::TYPE, number, name);
         }
         for sender in [3, 7] {
-            let header = Header {
+            bytes.extend(message(
                 sender,
-                kind: 4,
-                time: Stamp {
-                    seconds: 5,
-                    microseconds: 6,
-                },
-                sequence: 1,
-            };
-            append(&mut bytes, &header, &report(f64::from(sender)).encode());
+                4,
+                TIME,
+                &report(f64::from(sender)).encode(),
+            ));
         }
-        let header = Header {
-            sender: 7,
-            kind: 9,
-            ..Header::default()
+        let change = ButtonChange {
+            button: 2,
+            pressed: true,
         };
-        append(
-            &mut bytes,
-            &header,
-            &ButtonChange {
-                button: 2,
-                pressed: true,
-            }
-            .encode(),
-        );
+        bytes.extend(message(7, 9, Stamp::default(), &change.encode()));
+        bytes
+    }
+
+    const TIME: Stamp = Stamp {
+        seconds: 5,
+        microseconds: 6,
+    };
+
+    fn message(sender: i32, kind: i32, time: Stamp, payload: &[u8]) -> Vec<u8> {
+        let header = Header {
+            time,
+            sender,
+            kind,
+            sequence: 1,
+        };
+        let mut bytes = Vec::new();
+        append(&mut bytes, &header, payload);
         bytes
     }
 
@@ -350,11 +337,10 @@ mod tests {
                 rest = later;
             }
             client.receive(rest).expect("valid");
-            let time = Stamp { seconds: 5, microseconds: 6 };
             prop_assert_eq!(events(&mut client), vec![
                 Event::Open(Version { major: 7, minor: 38 }),
                 Event::Found,
-                Event::Pose(report(7.0), time),
+                Event::Pose(report(7.0), TIME),
                 Event::Button(ButtonChange { button: 2, pressed: true }),
             ]);
             prop_assert_eq!(client.senders(), ["VRPN Control", "Tracker1", "Tracker0"]);
@@ -400,13 +386,7 @@ mod tests {
     #[test]
     fn datagrams_bring_reports_but_no_names() {
         let mut client = Client::new("Tracker0", None);
-        let mut datagram = Vec::new();
-        let header = Header {
-            sender: 7,
-            kind: 4,
-            ..Header::default()
-        };
-        append(&mut datagram, &header, &report(1.0).encode());
+        let datagram = message(7, 4, Stamp::default(), &report(1.0).encode());
         client.receive_datagram(&datagram);
         assert_eq!(client.next_event(), None, "before the greeting");
         client.receive(&server_bytes()).expect("valid");
@@ -429,16 +409,7 @@ mod tests {
         let mut client = Client::new("Tracker0", None);
         client.receive(&server_bytes()).expect("valid");
         client.outgoing();
-        let mut ping = Vec::new();
-        append(
-            &mut ping,
-            &Header {
-                sender: 7,
-                kind: 1,
-                ..Header::default()
-            },
-            &[],
-        );
+        let ping = message(7, 1, Stamp::default(), &[]);
         client.receive(&ping).expect("valid");
         let pong = client.outgoing();
         let (message, _) = first(&pong).expect("valid").expect("whole");
@@ -452,20 +423,8 @@ mod tests {
         assert_eq!(error, Err(ClientError::Cookie(CookieError::NotVrpn)));
         let mut client = Client::new("Tracker0", None);
         client.receive(&server_bytes()).expect("valid");
-        let mut short = Vec::new();
-        append(
-            &mut short,
-            &Header {
-                sender: 7,
-                kind: 4,
-                ..Header::default()
-            },
-            &[0; 56],
-        );
-        assert!(matches!(
-            client.receive(&short),
-            Err(ClientError::Payload(_))
-        ));
+        let error = client.receive(&message(7, 4, Stamp::default(), &[0; 56]));
+        assert!(matches!(error, Err(ClientError::Payload(_))));
     }
 
     #[test]

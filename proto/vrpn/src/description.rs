@@ -50,10 +50,7 @@ pub fn append_udp(out: &mut Vec<u8>, address: SocketAddrV4) {
 /// # Errors
 /// [`PayloadError`] where the length does not fit the payload.
 pub fn name(payload: &[u8]) -> Result<String, PayloadError> {
-    let error = PayloadError {
-        bytes: payload.len(),
-        expected: "description of a name",
-    };
+    let error = PayloadError::of(payload, "description of a name");
     let mut fields = Fields(payload);
     let length = fields.i32().ok_or(error)?;
     let text = usize::try_from(length)
@@ -67,15 +64,21 @@ pub fn name(payload: &[u8]) -> Result<String, PayloadError> {
     Ok(String::from_utf8_lossy(&text[..end]).into_owned())
 }
 
+/// Notes that the peer's `number` means the name that is looked for, or no longer does.
+pub(crate) fn learn(known: &mut Option<i32>, number: i32, is_it: bool) {
+    if is_it {
+        *known = Some(number);
+    } else if *known == Some(number) {
+        *known = None;
+    }
+}
+
 /// Where the peer takes datagrams.
 ///
 /// # Errors
 /// [`PayloadError`] where it names no IPv4 address and port.
 pub fn udp(message: &Message<'_>) -> Result<SocketAddrV4, PayloadError> {
-    let error = PayloadError {
-        bytes: message.payload.len(),
-        expected: "description of a UDP port",
-    };
+    let error = PayloadError::of(message.payload, "description of a UDP port");
     let text = message.payload.split(|byte| *byte == 0).next();
     let address: Ipv4Addr = text
         .and_then(|text| std::str::from_utf8(text).ok())

@@ -36,10 +36,8 @@ impl ForceReport {
     /// # Errors
     /// [`PayloadError`] where it is too short.
     pub fn decode(payload: &[u8]) -> Result<Self, PayloadError> {
-        let force = Fields(payload).f64s().ok_or(PayloadError {
-            bytes: payload.len(),
-            expected: "force",
-        })?;
+        let force = Fields(payload).f64s();
+        let force = force.ok_or(PayloadError::of(payload, "force"))?;
         Ok(Self { force })
     }
 
@@ -59,10 +57,7 @@ impl SurfaceContactReport {
         let mut fields = Fields(payload);
         match (fields.f64s(), fields.f64s()) {
             (Some(position), Some(rotation)) => Ok(Self { position, rotation }),
-            _ => Err(PayloadError {
-                bytes: payload.len(),
-                expected: "surface contact point",
-            }),
+            _ => Err(PayloadError::of(payload, "surface contact point")),
         }
     }
 

@@ -49,3 +49,10 @@ pub struct PayloadError {
     /// What they should be.
     pub expected: &'static str,
 }
+
+impl PayloadError {
+    pub(crate) fn of(payload: &[u8], expected: &'static str) -> Self {
+        let bytes = payload.len();
+        Self { bytes, expected }
+    }
+}

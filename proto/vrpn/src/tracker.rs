@@ -81,10 +81,7 @@ impl PoseReport {
                 position,
                 rotation,
             })
-            .ok_or(PayloadError {
-                bytes: payload.len(),
-                expected: "tracker pose",
-            })
+            .ok_or(PayloadError::of(payload, "tracker pose"))
     }
 
     /// The payload.
@@ -114,10 +111,7 @@ impl VelocityReport {
                 interval: fields.f64()?,
             })
         })()
-        .ok_or(PayloadError {
-            bytes: payload.len(),
-            expected: "tracker velocity",
-        })
+        .ok_or(PayloadError::of(payload, "tracker velocity"))
     }
 
     /// The payload.

@@ -33,7 +33,7 @@ const SENT: [&str; 11] = [
     "000000206b01b2fd00003d060000000300000012000000360000000000000001",
 ];
 
-fn bytes(hexadecimal: &str) -> Vec<u8> {
+pub fn bytes(hexadecimal: &str) -> Vec<u8> {
     (0..hexadecimal.len())
         .step_by(2)
         .map(|at| u8::from_str_radix(&hexadecimal[at..at + 2], 16).expect("two digits"))

@@ -3,6 +3,7 @@
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
+use crate::golden::bytes;
 use taut_vrpn::{
     ButtonChange, ForceReport, PoseReport, Report, ServerSession, Stamp, SurfaceContactReport,
     VelocityReport, callback_address,
@@ -39,13 +40,6 @@ const NAMES: [&str; 8] = [
     "00000031000000000000000000000005fffffffe00000000000000157672706e5f466f7263654465766963652053435000000000000000000000000000000000",
     "00000033000000000000000000000006fffffffe00000000000000177672706e5f4261736520706f6e675f6d657373616765000000000000",
 ];
-
-fn bytes(hexadecimal: &str) -> Vec<u8> {
-    (0..hexadecimal.len())
-        .step_by(2)
-        .map(|at| u8::from_str_radix(&hexadecimal[at..at + 2], 16).expect("two digits"))
-        .collect()
-}
 
 const NOW: Stamp = Stamp {
     seconds: 0x6b01_e888,

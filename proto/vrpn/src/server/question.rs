@@ -1,6 +1,7 @@
 //! What a client may ask of the device, under the numbers that it chose for device and questions.
 
 use super::report;
+use crate::description::learn;
 use crate::message::Header;
 use crate::tracker;
 
@@ -82,14 +83,5 @@ impl ClientNumbers {
         let asked = Some(header.kind);
         let place = self.questions.iter().position(|known| *known == asked)?;
         Some(Question::ALL[place])
-    }
-}
-
-/// Notes that the peer's `number` means the name that is looked for, or no longer does.
-fn learn(known: &mut Option<i32>, number: i32, is_it: bool) {
-    if is_it {
-        *known = Some(number);
-    } else if *known == Some(number) {
-        *known = None;
     }
 }
