@@ -22,7 +22,7 @@ pub use connect::connect;
 pub use frame_gate::{FrameGate, FrameStatus, FrameTurn, ReleasedState};
 pub use group::{GroupReceiver, Roster};
 pub use link::{ClientLink, SessionEnd};
-pub use mesh_cache::{MESH_CACHE_BYTES, MeshCache};
+pub use mesh_cache::MeshCache;
 pub use options::{ClientOptions, Provenance, ReceivedState, ReceivedWrench, ServerState};
 pub use pictures::{PictureAsk, Shown, ShownPicture};
 pub use rejoiner::{RejoinPolicy, Rejoiner};
