@@ -29,10 +29,9 @@ pub mod server;
 pub mod transport;
 
 pub use client::{
-    ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, GroupReceiver, LinkHealth,
-    LinkWatch, MESH_CACHE_BYTES, MeshCache, PictureAsk, Provenance, ReceivedState, ReceivedWrench,
-    RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, ServerState, SessionEnd, Shown,
-    ShownPicture, SupervisedLink, connect,
+    ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, LinkHealth, LinkWatch, MeshCache,
+    PictureAsk, Provenance, ReceivedState, ReceivedWrench, RejoinPolicy, Rejoiner, ReleasedState,
+    Renewal, Roster, ServerState, SessionEnd, Shown, ShownPicture, SupervisedLink, connect,
 };
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters, MeshCounters};

@@ -3,7 +3,7 @@
 use super::{
     ClientLink, ClientOptions, control,
     group::GroupEnd,
-    hot::{Hot, Path},
+    hot::{Hot, Path, any_port_for},
     inbound::Inbound,
     link::AtJoin,
     meshes::Meshes,
@@ -20,7 +20,7 @@ use crate::{
 };
 use quinn::{Connection, ConnectionError, Endpoint, RecvStream, SendStream};
 use std::{
-    net::{Ipv4Addr, Ipv6Addr, SocketAddr},
+    net::{Ipv6Addr, SocketAddr},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -223,11 +223,7 @@ async fn reach(
     loop {
         let round = Instant::now();
         for address in addresses {
-            let any = match address {
-                SocketAddr::V4(_) => SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0)),
-                SocketAddr::V6(_) => SocketAddr::from((Ipv6Addr::UNSPECIFIED, 0)),
-            };
-            let Ok(endpoint) = Endpoint::client(any) else {
+            let Ok(endpoint) = Endpoint::client(any_port_for(*address)) else {
                 continue; // this machine has no such address family
             };
             let Ok(connecting) = endpoint.connect_with(config.clone(), *address, &name) else {
@@ -308,22 +304,12 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
     let agreed = VersionRange::only(welcome.version);
     let description = match expect(options, connection, &mut recv, agreed).await? {
         ControlMessage::Scene(description) => description,
-        other => {
-            return Err(protocol(
-                options,
-                format!("it sends {} where the scene is due", other.name()),
-            ));
-        }
+        other => return Err(undue(options, &other, "scene")),
     };
     let coupling = match options.role.may(Act::GetWrenches) {
         true => match expect(options, connection, &mut recv, agreed).await? {
             ControlMessage::Coupling(offer) => Some(offer),
-            other => {
-                return Err(protocol(
-                    options,
-                    format!("it sends {} where the coupling is due", other.name()),
-                ));
-            }
+            other => return Err(undue(options, &other, "coupling")),
         },
         false => None,
     };
@@ -360,10 +346,10 @@ async fn greet(
             ours: options.versions,
         }),
         ControlMessage::Refused(refusal) => Err(refused(options, refusal)),
-        other => Err(protocol(
-            options,
-            format!("it answers Hello with {}", other.name()),
-        )),
+        other => {
+            let reason = format!("it answers Hello with {}", other.name());
+            Err(protocol(options, reason))
+        }
     }
 }
 
@@ -417,6 +403,11 @@ fn refused(options: &ClientOptions, refusal: Refusal) -> LinkError {
     }
 }
 
+fn undue(options: &ClientOptions, message: &ControlMessage, due: &str) -> LinkError {
+    let reason = format!("it sends {} where the {due} is due", message.name());
+    protocol(options, reason)
+}
+
 fn protocol(options: &ClientOptions, reason: String) -> LinkError {
     LinkError::Protocol {
         server: options.server.clone(),
@@ -427,6 +418,7 @@ fn protocol(options: &ClientOptions, reason: String) -> LinkError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::net::Ipv4Addr;
     use taut_proto::{ClusterKey, Role};
 
     /// Ends the first connections without a word, before or after the handshake, and answers the next one.

@@ -3,8 +3,7 @@
 use super::inbound::lock;
 use std::{
     net::SocketAddr,
-    sync::{Arc, Mutex, OnceLock},
-    time::Instant,
+    sync::{Arc, Mutex},
 };
 use taut_proto::{
     Group, GroupMember, GroupOpener, GroupSealer, Payload, Role,
@@ -23,17 +22,12 @@ pub struct Roster {
     pub multicast: Option<SocketAddr>,
 }
 
-/// Takes what a member or the server said to the group: its number, what, and when it arrived. Runs on the receiving thread: it must return
-/// within microseconds and wait for nothing.
-pub type GroupReceiver = Box<dyn Fn(u16, &Payload, Instant) + Send + Sync>;
-
 pub(crate) struct GroupEnd {
     epoch: u32,
     own: u16,
     sealer: Mutex<GroupSealer>,
     opener: Mutex<GroupOpener>,
     roster: Mutex<Option<Arc<Roster>>>,
-    receiver: OnceLock<GroupReceiver>,
 }
 
 impl GroupEnd {
@@ -44,7 +38,6 @@ impl GroupEnd {
             sealer: Mutex::new(GroupSealer::new(epoch, own)),
             opener: Mutex::default(),
             roster: Mutex::default(),
-            receiver: OnceLock::new(),
         }
     }
 
@@ -102,16 +95,5 @@ impl GroupEnd {
 
     pub(crate) fn open(&self, datagram: &[u8], now_ns: u64) -> Result<Opened, OpenError> {
         lock(&self.opener).open(datagram, now_ns)
-    }
-
-    /// Sets who takes what comes from the group; `false` if there is one already.
-    pub(crate) fn set_receiver(&self, receiver: GroupReceiver) -> bool {
-        self.receiver.set(receiver).is_ok()
-    }
-
-    pub(crate) fn hand_over(&self, sender: u16, payload: &Payload, received: Instant) {
-        if let Some(receiver) = self.receiver.get() {
-            receiver(sender, payload, received);
-        }
     }
 }

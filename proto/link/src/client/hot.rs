@@ -69,12 +69,8 @@ pub(crate) struct Hot {
 impl Path {
     /// A socket of the server's address family; nothing is sent yet.
     pub(crate) fn udp(server: SocketAddr) -> Result<Path, LinkError> {
-        let any = match server {
-            SocketAddr::V4(_) => SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0)),
-            SocketAddr::V6(_) => SocketAddr::from((Ipv6Addr::UNSPECIFIED, 0)),
-        };
         let open = || -> io::Result<UdpSocket> {
-            let socket = UdpSocket::bind(any)?;
+            let socket = UdpSocket::bind(any_port_for(server))?;
             socket.set_write_timeout(Some(SEND_TIMEOUT))?;
             Ok(socket)
         };
@@ -192,14 +188,11 @@ impl Hot {
             Ok(opened) => opened,
             Err(error) => return self.inbound.count_refused(&error),
         };
-        let counters = &self.inbound.counters;
-        match (opened.header.sender, &opened.payload) {
-            (SERVER_SENDER, Payload::Hot(_)) => {}
-            (sender, payload) => {
-                counters.from_members.one();
-                self.take_from_member(&opened, received);
-                self.group.hand_over(sender, payload, received);
-            }
+        // States of the group come by multicast.
+        let is_state = matches!(opened.payload, Payload::Hot(_));
+        if opened.header.sender != SERVER_SENDER || !is_state {
+            self.inbound.counters.from_members.one();
+            self.take_from_member(&opened, received);
         }
     }
 
@@ -360,6 +353,14 @@ impl Hot {
                 Err(_) => {} // time for a request
             }
         }
+    }
+}
+
+/// Any port of this machine from which `peer` can be reached.
+pub(super) fn any_port_for(peer: SocketAddr) -> SocketAddr {
+    match peer {
+        SocketAddr::V4(_) => SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0)),
+        SocketAddr::V6(_) => SocketAddr::from((Ipv6Addr::UNSPECIFIED, 0)),
     }
 }
 

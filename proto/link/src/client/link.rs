@@ -1,8 +1,11 @@
 //! A joined session: scene, meshes, states, device input and reports.
 
 use super::{
-    FrameGate, GroupReceiver, PictureAsk, ReceivedState, ReceivedWrench, Roster, hot::Hot,
-    inbound::lock, meshes::Meshes, pictures::PictureSlot,
+    FrameGate, PictureAsk, ReceivedState, ReceivedWrench, Roster,
+    hot::Hot,
+    inbound::lock,
+    meshes::{Meshes, Source},
+    pictures::PictureSlot,
 };
 use crate::{
     CHANGE_REASON, ClientCounters, LinkError, MeshCounters, STOP_REASON,
@@ -47,11 +50,7 @@ pub struct ClientLink {
     server: String,
     endpoint: Endpoint,
     hot: Arc<Hot>,
-    session: u16,
-    epoch: u32,
-    node_timeout: Duration,
-    description: SceneDescription,
-    coupling: Option<CouplingOffer>,
+    joined: AtJoin,
     meshes: Arc<Meshes>,
     pictures: PictureSlot,
     outbox: mpsc::Sender<ControlMessage>,
@@ -85,11 +84,7 @@ impl ClientLink {
             server,
             endpoint,
             hot,
-            session: joined.session,
-            epoch: joined.epoch,
-            node_timeout: joined.node_timeout,
-            description: joined.description,
-            coupling: joined.coupling,
+            joined,
             meshes,
             pictures,
             outbox,
@@ -98,22 +93,22 @@ impl ClientLink {
 
     /// The scene and the workbench, as at join.
     pub fn description(&self) -> &SceneDescription {
-        &self.description
+        &self.joined.description
     }
 
     /// Where the force may be computed, as at join; `None` unless [`crate::Role::Device`] joined.
     pub fn coupling(&self) -> Option<&CouplingOffer> {
-        self.coupling.as_ref()
+        self.joined.coupling.as_ref()
     }
 
     /// Number of this session at the server.
     pub fn session(&self) -> u16 {
-        self.session
+        self.joined.session
     }
 
     /// Incarnation of the server: another process has another one, and so has another session of the same one, as after a change of the scene.
     pub fn epoch(&self) -> u32 {
-        self.epoch
+        self.joined.epoch
     }
 
     /// Version of the protocol that both ends agreed on.
@@ -123,14 +118,12 @@ impl ClientLink {
 
     /// Silence on the hot plane after which the server gives a node up, and after which it is to be given up itself.
     pub fn node_timeout(&self) -> Duration {
-        self.node_timeout
+        self.joined.node_timeout
     }
 
     /// The mesh of `hash`, from memory, from the cache on disk, or from the server. Its hash has been checked.
     pub async fn mesh(&self, hash: MeshHash) -> Result<Arc<MeshBlob>, LinkError> {
-        self.meshes
-            .get(&self.hot.connection, self.hot.version, &self.server, hash)
-            .await
+        self.meshes.get(self.source(), hash).await
     }
 
     /// The texture of `hash`, which a mesh names, as [`Self::mesh`]. It is not kept in memory.
@@ -138,9 +131,7 @@ impl ClientLink {
     /// # Errors
     /// The server does not have it, or is gone.
     pub async fn texture(&self, hash: MeshHash) -> Result<Texture, LinkError> {
-        self.meshes
-            .texture(&self.hot.connection, self.hot.version, &self.server, hash)
-            .await
+        self.meshes.load(self.source(), hash, Texture::decode).await
     }
 
     /// The light around the scene, of `hash`, as [`Self::mesh`].
@@ -149,8 +140,16 @@ impl ClientLink {
     /// The server does not have it, or is gone.
     pub async fn panorama(&self, hash: MeshHash) -> Result<Panorama, LinkError> {
         self.meshes
-            .panorama(&self.hot.connection, self.hot.version, &self.server, hash)
+            .load(self.source(), hash, Panorama::decode)
             .await
+    }
+
+    fn source(&self) -> Source<'_> {
+        Source {
+            connection: &self.hot.connection,
+            version: self.hot.version,
+            server: &self.server,
+        }
     }
 
     /// Where the meshes came from, over all sessions of this client.
@@ -172,7 +171,12 @@ impl ClientLink {
     /// Takes part in the barrier of frames, where the server leads one and [`crate::Role::Render`] joined. `period`: shortest time between
     /// two frames that this node is made for; the slowest node's is everybody's. There is one gate at a time: a second one takes over.
     pub fn frame_gate(&self, period: Duration) -> FrameGate {
-        FrameGate::new(self.hot.clone(), self.session, period, self.node_timeout)
+        let AtJoin {
+            session,
+            node_timeout,
+            ..
+        } = self.joined;
+        FrameGate::new(self.hot.clone(), session, period, node_timeout)
     }
 
     /// Whether the server wants pictures of what this node shows: [`ClientLink::take_picture_ask`] has the question.
@@ -262,11 +266,6 @@ impl ClientLink {
     /// It proves to the receiver that a member sent it, not which one: see [`taut_proto::group`].
     pub fn send_to_member(&self, member: u16, payload: &Payload) -> bool {
         self.hot.send_to_member(member, payload)
-    }
-
-    /// Sets who takes what other members send with [`ClientLink::send_to_member`]; `false` if there is one already.
-    pub fn on_group_datagram(&self, receiver: GroupReceiver) -> bool {
-        self.hot.group.set_receiver(receiver)
     }
 
     /// Sends a report without waiting; `false` if earlier ones are not away yet or the link is closed.

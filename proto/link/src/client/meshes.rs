@@ -14,7 +14,7 @@ use std::{
 };
 use taut_cache::Cached;
 use taut_proto::{
-    DecodeError, MeshBlob, MeshHash, Panorama, SceneDescription, Texture, VersionRange,
+    DecodeError, MeshBlob, MeshHash, SceneDescription, VersionRange,
     control::{ControlMessage, MeshHeader, MeshRequest},
     mesh_blob::MAX_MESH_BYTES,
 };
@@ -31,6 +31,16 @@ pub(crate) struct Meshes {
     known: Mutex<HashMap<MeshHash, Arc<MeshBlob>>>,
     cache: Option<Arc<MeshCache>>,
     counters: MeshCounterCells,
+}
+
+/// The server of a session, which has what is asked for by hash.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'a> {
+    pub(crate) connection: &'a Connection,
+    /// Version of the session.
+    pub(crate) version: u8,
+    /// Its address, for people.
+    pub(crate) server: &'a str,
 }
 
 impl Meshes {
@@ -57,58 +67,27 @@ impl Meshes {
     /// The mesh of `hash`, from here or from the server.
     pub(crate) async fn get(
         &self,
-        connection: &Connection,
-        version: u8,
-        server: &str,
+        source: Source<'_>,
         hash: MeshHash,
     ) -> Result<Arc<MeshBlob>, LinkError> {
         if let Some(mesh) = lock(&self.known).get(&hash) {
             return Ok(mesh.clone());
         }
-        let mesh = self.load(connection, version, server, hash, MeshBlob::decode);
-        let mesh = Arc::new(mesh.await?);
+        let mesh = Arc::new(self.load(source, hash, MeshBlob::decode).await?);
         lock(&self.known).insert(hash, mesh.clone());
         Ok(mesh)
     }
 
-    /// The panorama of `hash`, from the cache on disk or from the server.
-    pub(crate) async fn panorama(
+    /// What has this `hash`, from the cache on disk or from the server.
+    pub(crate) async fn load<T: Send + 'static>(
         &self,
-        connection: &Connection,
-        version: u8,
-        server: &str,
-        hash: MeshHash,
-    ) -> Result<Panorama, LinkError> {
-        self.load(connection, version, server, hash, Panorama::decode)
-            .await
-    }
-
-    /// The texture of `hash`, from the cache on disk or from the server.
-    pub(crate) async fn texture(
-        &self,
-        connection: &Connection,
-        version: u8,
-        server: &str,
-        hash: MeshHash,
-    ) -> Result<Texture, LinkError> {
-        self.load(connection, version, server, hash, Texture::decode)
-            .await
-    }
-
-    async fn load<T: Send + 'static>(
-        &self,
-        connection: &Connection,
-        version: u8,
-        server: &str,
+        source: Source<'_>,
         hash: MeshHash,
         decode: Decode<T>,
     ) -> Result<T, LinkError> {
         match self.read_cached(hash, decode).await {
             Some(found) => Ok(found),
-            None => {
-                self.fetch_checked(connection, version, server, hash, decode)
-                    .await
-            }
+            None => self.fetch_checked(source, hash, decode).await,
         }
     }
 
@@ -136,13 +115,11 @@ impl Meshes {
 
     async fn fetch_checked<T: Send + 'static>(
         &self,
-        connection: &Connection,
-        version: u8,
-        server: &str,
+        source: Source<'_>,
         hash: MeshHash,
         decode: Decode<T>,
     ) -> Result<T, LinkError> {
-        let bytes = fetch(connection, version, server, hash).await?;
+        let bytes = fetch(source, hash).await?;
         self.counters.fetched.one();
         self.counters.fetched_bytes.add(bytes.len() as u64);
         let cache = self.cache.clone();
@@ -159,7 +136,7 @@ impl Meshes {
         let (mesh, not_kept) = decoded
             .await
             .unwrap_or_else(|error| Err(error.to_string()))
-            .map_err(|reason| bad_mesh(server, hash, reason))?;
+            .map_err(|reason| bad_mesh(source.server, hash, reason))?;
         if let Some(error) = not_kept {
             self.counters.not_kept.one();
             tracing::warn!("mesh {hash} cannot be kept in the cache ({error}); going on without");
@@ -168,12 +145,12 @@ impl Meshes {
     }
 }
 
-async fn fetch(
-    connection: &Connection,
-    version: u8,
-    server: &str,
-    hash: MeshHash,
-) -> Result<Vec<u8>, LinkError> {
+async fn fetch(source: Source<'_>, hash: MeshHash) -> Result<Vec<u8>, LinkError> {
+    let Source {
+        connection,
+        version,
+        server,
+    } = source;
     // Where the whole connection is gone, why it is says more than that this stream ended.
     let ended = |reason: String| LinkError::Closed {
         server: server.to_owned(),
@@ -185,13 +162,10 @@ async fn fetch(
         .open_bi()
         .await
         .map_err(|error| ended(peer_text(&error)))?;
-    write_message(
-        &mut send,
-        &ControlMessage::MeshRequest(MeshRequest { hash }),
-        version,
-    )
-    .await
-    .map_err(|error| ended(peer_text(&error)))?;
+    let request = ControlMessage::MeshRequest(MeshRequest { hash });
+    write_message(&mut send, &request, version)
+        .await
+        .map_err(|error| ended(peer_text(&error)))?;
     let _ = send.finish(); // fails only if the stream is gone, and then reading fails too
     let answer = read_message(&mut recv, MAX_HEADER_BYTES, VersionRange::only(version))
         .await
@@ -202,11 +176,8 @@ async fn fetch(
             length,
         }) if found == hash => length as usize,
         other => {
-            return Err(bad_mesh(
-                server,
-                hash,
-                format!("the answer is {}", other.name()),
-            ));
+            let reason = format!("the answer is {}", other.name());
+            return Err(bad_mesh(server, hash, reason));
         }
     };
     if length == 0 {
@@ -225,11 +196,8 @@ async fn fetch(
         .await
         .map_err(|error| ended(peer_text(&error)))?;
     if bytes.len() != length {
-        return Err(bad_mesh(
-            server,
-            hash,
-            format!("{} of {length} bytes came", bytes.len()),
-        ));
+        let reason = format!("{} of {length} bytes came", bytes.len());
+        return Err(bad_mesh(server, hash, reason));
     }
     Ok(bytes)
 }

@@ -20,7 +20,7 @@ mod watch;
 
 pub use connect::connect;
 pub use frame_gate::{FrameGate, FrameStatus, FrameTurn, ReleasedState};
-pub use group::{GroupReceiver, Roster};
+pub use group::Roster;
 pub use link::{ClientLink, SessionEnd};
 pub use mesh_cache::MeshCache;
 pub use options::{ClientOptions, Provenance, ReceivedState, ReceivedWrench, ServerState};
