@@ -46,7 +46,7 @@ pub use server::{
     AlsoKey, Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FloodLimits,
     ForceInput, ForceOutput, FrameMaster, FrameReport, HEAD_READERS, HeadInput, HeadOutput,
     LinkEvent, MAX_ASKED_BYTES, NodePicture, PICTURE_PATIENCE, PictureAnswer, PictureAsker,
-    ServerLink, ServerOptions, serve,
+    Reading, ServerLink, ServerOptions, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{

@@ -3,18 +3,17 @@
 use super::{
     Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, ForceOutput, FrameMaster,
     FrameReport, HEAD_READERS, HeadOutput, LinkEvent, PictureAsker, ServerOptions, accept,
-    device_input::InputWriter,
     device_receiver::DevicePaths,
     events::EventHub,
     eviction,
     force_input::force_input,
     frames::Frames,
     group::{self, GroupHub},
-    head_input::head_inputs,
     joining::MAX_JOINING,
     listening::{Listening, freed, listen, system},
     places::Places,
     quic_outbox::{self, QuicSender},
+    readings::readings,
     receive,
     sent_states::SentStates,
     shared::{MESH_BURST_BYTES, MESH_BYTES_PER_SECOND, Sessions, Shared},
@@ -85,11 +84,11 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     } = listen(&options)?;
 
     let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
-    let (input, output) = triple_buffer::triple_buffer(&None);
+    let (inputs, [input_output]) = readings();
     let epoch = random_epoch()?;
     let group = GroupHub::new(epoch, options.multicast)
         .map_err(|error| system("open the multicast socket (check the interface)", &error))?;
-    let (heads, head_outputs) = head_inputs();
+    let (heads, head_outputs) = readings();
     let (forces, force_output) = force_input();
     let shared = Arc::new(Shared {
         key: options.key,
@@ -115,7 +114,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         counters: CounterCells::default(),
         events: events_in,
         arm: OnceLock::new(),
-        inputs: InputWriter::new(input),
+        inputs,
         frames: options.frames.map(Frames::new),
         sent_states: SentStates::new(),
         group,
@@ -137,7 +136,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         quic_address,
         udp_address,
         events: Mutex::new(events),
-        inputs: Mutex::new(Some(output)),
+        inputs: Mutex::new(Some(input_output)),
         heads: Mutex::new(Some(head_outputs)),
         force: Mutex::new(Some(force_output)),
         threads: Mutex::new(threads),

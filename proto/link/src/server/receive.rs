@@ -4,19 +4,14 @@
 //! that session is known to be counts against the rate of its source and of all unknown sources together. After it: the session's own rate.
 
 use super::{
-    DeviceInput, HeadInput,
-    device_input::Taken,
     force_input::TakenForce,
     gate::{act_of_datagram, permits},
+    readings::{Reading, Taken},
     session::Session,
     shared::Shared,
 };
 use crate::{lock::lock, readiness::wait_readable};
-use std::{
-    net::SocketAddr,
-    sync::{Arc, atomic::Ordering},
-    time::Duration,
-};
+use std::{net::SocketAddr, sync::Arc, time::Duration};
 use taut_proto::{
     Act, DecodeError, Header, Payload,
     header::MAX_DATAGRAM_BYTES,
@@ -30,7 +25,7 @@ const STOP_CHECK: Duration = Duration::from_millis(50);
 /// Body of the UDP receiving thread; ends when the server stops.
 pub(crate) fn run_udp(shared: &Arc<Shared>) {
     let mut buffer = [0; MAX_DATAGRAM_BYTES + 1]; // one more byte tells an oversized datagram
-    while !shared.stopping.load(Ordering::Relaxed) {
+    while !shared.is_stopping() {
         match shared.udp.recv_from(&mut buffer) {
             Ok((length, from)) => {
                 let now_ns = shared.clock.now_ns();
@@ -142,27 +137,18 @@ fn take(
             }
         }
         Payload::Input(sample) => {
-            let input = DeviceInput {
-                sample,
-                received_ns: now_ns,
-                session: session.number,
-            };
-            match shared.inputs.offer(input) {
+            let reading = reading_of(session, sample, now_ns);
+            match shared.inputs.offer(reading, sample.index, &sample.pose) {
                 Taken::Newest => counters.inputs.one(),
                 Taken::Overtaken => counters.inputs_late.one(),
                 Taken::NoPose => counters.inputs_refused.one(),
             }
         }
         Payload::Head(sample) => {
-            let input = HeadInput {
-                sample,
-                received_ns: now_ns,
-                session: session.number,
-            };
-            if shared.heads.offer(input) {
-                counters.heads.one();
-            } else {
-                counters.heads_refused.one();
+            let reading = reading_of(session, sample, now_ns);
+            match shared.heads.offer(reading, sample.index, &sample.pose) {
+                Taken::Newest => counters.heads.one(),
+                Taken::Overtaken | Taken::NoPose => counters.heads_refused.one(),
             }
         }
         Payload::Force(sample) => match shared.forces.offer(sample, session.number, now_ns) {
@@ -181,6 +167,14 @@ fn take(
         | Payload::PassedForce(_)
         | Payload::Confirm(_)
         | Payload::PathChallenge(_) => {}
+    }
+}
+
+fn reading_of<S>(session: &Session, sample: S, now_ns: u64) -> Reading<S> {
+    Reading {
+        sample,
+        received_ns: now_ns,
+        session: session.number,
     }
 }
 

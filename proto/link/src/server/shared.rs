@@ -1,10 +1,10 @@
 //! What the tasks and threads of a server share.
 
 use super::{
-    LinkEvent, content::EncodedContent, device_input::InputWriter, device_receiver::DevicePaths,
-    events::EventHub, force_input::ForceWriter, frames::Frames, group::GroupHub,
-    head_input::HeadWriter, joining::Place, options::AlsoKey, places::Places,
-    quic_outbox::QuicSender, sent_states::SentStates, session::Session,
+    LinkEvent, content::EncodedContent, device_receiver::DevicePaths, events::EventHub,
+    force_input::ForceWriter, frames::Frames, group::GroupHub, joining::Place, options::AlsoKey,
+    places::Places, quic_outbox::QuicSender, readings::ReadingWriter, sent_states::SentStates,
+    session::Session,
 };
 use crate::{
     SessionClock,
@@ -21,7 +21,7 @@ use std::{
     },
 };
 use taut_proto::{
-    ClusterKey, JoinPolicy, Role, VersionRange,
+    ClusterKey, HeadSample, InputSample, JoinPolicy, Role, VersionRange,
     control::RefusalCode,
     limits::{JoinGuard, UnknownSources},
     membership::{Pace, SilenceLimits},
@@ -54,9 +54,9 @@ pub(crate) struct Shared {
     pub(crate) events: SyncSender<LinkEvent>,
     /// Who takes an operator's wish, at once.
     pub(crate) arm: OnceLock<ArmTaker>,
-    pub(crate) inputs: InputWriter,
+    pub(crate) inputs: ReadingWriter<InputSample>,
     pub(crate) frames: Option<Frames>,
-    pub(crate) heads: HeadWriter,
+    pub(crate) heads: ReadingWriter<HeadSample>,
     pub(crate) forces: ForceWriter,
     pub(crate) sent_states: SentStates,
     pub(crate) group: GroupHub,
