@@ -3,13 +3,12 @@
 //! One task looks at the sessions [`POLL_PERIOD`] by period: what changed meanwhile is one change. Each session's writer ([`super::downstream`])
 //! takes the newest from a watch, so that a member whose stream is slow skips what is old already.
 
-use super::shared::Shared;
+use super::{listening::random, shared::Shared};
 use crate::{
     LinkError, MulticastOptions,
     lock::{Mutex, lock},
     multicast,
 };
-use ring::rand::{SecureRandom, SystemRandom};
 use std::{
     io,
     net::SocketAddr,
@@ -22,7 +21,7 @@ use std::{
 use taut_proto::{
     Group, GroupMember, GroupSealer, Kind,
     control::ControlMessage,
-    group::{GROUP_SECRET_BYTES, GroupSecret, SERVER_SENDER, is_member},
+    group::{GroupSecret, SERVER_SENDER, is_member},
     header::MAX_DATAGRAM_BYTES,
     seal::DatagramBuffer,
 };
@@ -139,13 +138,13 @@ pub(crate) async fn run(shared: Arc<Shared>) {
     let mut members = Vec::new();
     let mut generation = 0;
     let mut secret = None;
-    while !shared.stopping.load(Ordering::Relaxed) {
+    while !shared.is_stopping() {
         let now = roster(&shared);
         if now != members {
             let same = numbers(&now).eq(numbers(&members));
             let drawn = match secret.clone().filter(|_| same) {
                 Some(secret) => Ok(secret),
-                None => draw_secret(),
+                None => random().map(GroupSecret),
             };
             let outcome = drawn.and_then(|drawn| {
                 generation += u32::from(!same);
@@ -178,7 +177,7 @@ fn roster(shared: &Shared) -> Vec<GroupMember> {
     let sessions = shared.sessions.all();
     let mut members: Vec<_> = sessions
         .iter()
-        .filter(|session| is_member(session.role) && session.is_newest())
+        .filter(|session| is_member(session.role) && session.is_newest)
         .map(|session| GroupMember {
             sender: session.number,
             node: session.node.as_str().into(),
@@ -192,15 +191,4 @@ fn roster(shared: &Shared) -> Vec<GroupMember> {
 
 fn numbers(members: &[GroupMember]) -> impl Iterator<Item = u16> + '_ {
     members.iter().map(|member| member.sender)
-}
-
-fn draw_secret() -> Result<GroupSecret, LinkError> {
-    let mut bytes = [0; GROUP_SECRET_BYTES];
-    SystemRandom::new()
-        .fill(&mut bytes)
-        .map_err(|_| LinkError::System {
-            what: "draw a group secret",
-            reason: "the system gives no random numbers".to_owned(),
-        })?;
-    Ok(GroupSecret(bytes))
 }

@@ -10,7 +10,7 @@ use super::{
     frames::Frames,
     group::{self, GroupHub},
     joining::MAX_JOINING,
-    listening::{Listening, freed, listen, system},
+    listening::{Listening, freed, listen, random, system},
     places::Places,
     quic_outbox::{self, QuicSender},
     readings::readings,
@@ -24,7 +24,6 @@ use crate::{
     framing::{CLOSE_CHANGING, CLOSE_STOPPING},
     lock::{Mutex, lock},
 };
-use ring::rand::{SecureRandom, SystemRandom};
 use std::{
     net::SocketAddr,
     sync::{
@@ -85,7 +84,8 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
 
     let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
     let (inputs, [input_output]) = readings();
-    let epoch = random_epoch()?;
+    // A new incarnation has a new number, so that datagrams of an earlier one are told apart.
+    let epoch = u32::from_le_bytes(random()?);
     let group = GroupHub::new(epoch, options.multicast)
         .map_err(|error| system("open the multicast socket (check the interface)", &error))?;
     let (heads, head_outputs) = readings();
@@ -318,16 +318,4 @@ impl Drop for ServerLink {
         self.shared.stopping.store(true, Ordering::Relaxed);
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
     }
-}
-
-/// A new incarnation has a new number, so that datagrams of an earlier one are told apart.
-fn random_epoch() -> Result<u32, LinkError> {
-    let mut bytes = [0; 4];
-    SystemRandom::new()
-        .fill(&mut bytes)
-        .map_err(|_| LinkError::System {
-            what: "draw a random number",
-            reason: "the system gives none".to_owned(),
-        })?;
-    Ok(u32::from_le_bytes(bytes))
 }

@@ -2,6 +2,7 @@
 
 use super::ServerOptions;
 use crate::{LinkError, transport};
+use ring::rand::{SecureRandom, SystemRandom};
 use std::{
     io,
     net::{SocketAddr, UdpSocket},
@@ -71,6 +72,17 @@ pub(super) async fn freed(address: SocketAddr) {
     while taken() {
         sleep(FREE_CHECK).await;
     }
+}
+
+/// What nobody can guess.
+pub(super) fn random<const N: usize>() -> Result<[u8; N], LinkError> {
+    let mut bytes = [0; N];
+    let drawn = SystemRandom::new().fill(&mut bytes);
+    drawn.map_err(|_| LinkError::System {
+        what: "draw a random number",
+        reason: "the system gives none".to_owned(),
+    })?;
+    Ok(bytes)
 }
 
 pub(super) fn system(what: &'static str, error: &io::Error) -> LinkError {

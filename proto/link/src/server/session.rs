@@ -1,10 +1,13 @@
 //! One client's session: its keys, where its datagrams go, and what is counted of it.
 
-pub(crate) use crate::lock::lock;
-
-use super::{ClientStatus, LinkEvent, quic_outbox::QuicOutbox, rights::Rights, shared::Shared};
-use crate::{counters::Cell, lock::Mutex};
-use ring::rand::{SecureRandom, SystemRandom};
+use super::{
+    ClientStatus, LinkEvent, listening::random, quic_outbox::QuicOutbox, rights::Rights,
+    shared::Shared,
+};
+use crate::{
+    counters::Cell,
+    lock::{Mutex, lock},
+};
 use std::{
     net::SocketAddr,
     sync::atomic::{AtomicBool, AtomicU64, Ordering},
@@ -27,9 +30,10 @@ pub(crate) struct Session {
     grant: Grant,
     pub(crate) transport: Transport,
     pub(crate) rate_hz: u32,
-    /// Version of the protocol that both ends agreed on, and whether it is the newest of the server.
+    /// Version of the protocol that both ends agreed on.
     pub(crate) version: u8,
-    is_newest: bool,
+    /// Whether that is the newest of the server: the group's datagrams are of that one.
+    pub(crate) is_newest: bool,
     /// Whether it proved a secret of the second cluster key.
     pub(crate) by_also_key: bool,
     /// What it does beside what every client of its role does.
@@ -221,11 +225,6 @@ impl Session {
         lock(&self.path).answer(from, answer)
     }
 
-    /// Whether it speaks the newest version of the server: the group's datagrams are of that one.
-    pub(crate) fn is_newest(&self) -> bool {
-        self.is_newest
-    }
-
     /// Seals an encoded payload, to be sent by [`Session::send_sealed`]: where it goes, and its bytes. `None` where there is no such way (yet).
     pub(crate) fn seal_for_udp(
         &self,
@@ -343,7 +342,10 @@ impl Session {
         let is_answer = matches!(opened.payload, Payload::PathResponse(_));
         let challenge = from
             .filter(|_| is_newest && !is_answer && self.transport == Transport::Udp)
-            .and_then(|from| lock(&self.path).hear(from, self.control.ip(), now_ns, draw_token));
+            .and_then(|from| {
+                let draw = || random().ok().map(u64::from_le_bytes);
+                lock(&self.path).hear(from, self.control.ip(), now_ns, draw)
+            });
         Ok((opened, challenge))
     }
 
@@ -424,11 +426,4 @@ fn is_full(error: &std::io::Error) -> bool {
     #[cfg(not(unix))]
     let no_buffers = false;
     no_buffers || error.kind() == std::io::ErrorKind::WouldBlock
-}
-
-/// What nobody can guess; `None` where the system gives no random numbers.
-fn draw_token() -> Option<u64> {
-    let mut bytes = [0; 8];
-    SystemRandom::new().fill(&mut bytes).ok()?;
-    Some(u64::from_le_bytes(bytes))
 }
