@@ -265,10 +265,7 @@ fn admit(
             old.node
         );
         old.connection.close(CLOSE_REPLACED, reason.as_bytes());
-        shared.tell(LinkEvent::Left {
-            status: old.status(now_ns),
-            reason,
-        });
+        shared.tell_left(&old, reason);
     }
     let welcome = Welcome {
         version,
@@ -337,10 +334,7 @@ async fn attend(shared: &Arc<Shared>, entry: Entry, send: SendStream, mut recv: 
     // A session that was replaced is gone already, and told.
     if shared.sessions.remove(session.number) {
         tracing::info!(node = session.node, "client left: {reason}");
-        shared.tell(LinkEvent::Left {
-            status: session.status(shared.clock.now_ns()),
-            reason,
-        });
+        shared.tell_left(session, reason);
     }
 }
 

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use taut_proto::{EventBatch, EventOutbox, HotState, events::is_newer};
 use tokio::sync::watch;
 
+#[derive(Default)]
 pub(crate) struct EventHub {
     outbox: Mutex<EventOutbox>,
     /// Whether states repeat anything: saves the lock where nothing happens.
@@ -15,17 +16,6 @@ pub(crate) struct EventHub {
     newest: AtomicU32,
     /// The same for those who follow, a moment later.
     newest_sent: watch::Sender<u32>,
-}
-
-impl Default for EventHub {
-    fn default() -> EventHub {
-        EventHub {
-            outbox: Mutex::default(),
-            repeats: AtomicBool::new(false),
-            newest: AtomicU32::new(0),
-            newest_sent: watch::Sender::new(0),
-        }
-    }
 }
 
 impl EventHub {

@@ -103,9 +103,6 @@ fn evict(shared: &Shared, session: &Session, silence: Duration) {
         tracing::info!(node = session.node, "evicted: {reason}");
         session.connection.close(CLOSE_EVICTED, reason.as_bytes());
         shared.counters.evicted.one();
-        shared.tell(LinkEvent::Left {
-            status: session.status(shared.clock.now_ns()),
-            reason,
-        });
+        shared.tell_left(session, reason);
     }
 }

@@ -223,7 +223,7 @@ impl FrameMaster {
             recorder.record(&shown, name_of);
         }
         for lit in self.lit.drain(..) {
-            recorder.record_light(&lit, name_of);
+            recorder.lights.record(&lit, name_of);
         }
     }
 }

@@ -35,7 +35,8 @@ pub struct FrameReport {
 /// Gathers shown frames. Memory is taken once, and once for each node that shows its first frame.
 pub(crate) struct Recorder {
     calls: Apart,
-    lights: Apart,
+    /// When the pictures lit up.
+    pub(super) lights: Apart,
     overhead: Histogram<u64>,
     age: Histogram<u64>,
     /// [`MAX_NODES`] at most; then the oldest goes.
@@ -55,7 +56,7 @@ impl Default for Recorder {
 }
 
 /// How far apart the nodes were in each frame.
-struct Apart {
+pub(super) struct Apart {
     skew: Histogram<u64>,
     nodes: Vec<(String, Histogram<u64>)>,
 }
@@ -70,7 +71,12 @@ impl Default for Apart {
 }
 
 impl Apart {
-    fn record<'a>(&mut self, shown: &FrameSkew, name_of: impl Fn(u16) -> Option<&'a str>) {
+    /// Takes a frame in; `name_of` knows the nodes.
+    pub(super) fn record<'a>(
+        &mut self,
+        shown: &FrameSkew,
+        name_of: impl Fn(u16) -> Option<&'a str>,
+    ) {
         self.skew.saturating_record(shown.skew_ns);
         for swap in &shown.swaps {
             let Some(name) = name_of(swap.session) else {
@@ -107,15 +113,6 @@ impl Recorder {
         self.overhead.saturating_record(shown.overhead_ns);
         self.age.saturating_record(shown.age_ns);
         self.calls.record(shown, name_of);
-    }
-
-    /// Takes in how far apart the pictures of a frame lit up.
-    pub(crate) fn record_light<'a>(
-        &mut self,
-        lit: &FrameSkew,
-        name_of: impl Fn(u16) -> Option<&'a str>,
-    ) {
-        self.lights.record(lit, name_of);
     }
 
     /// Notes what became of a node; whether it runs free from now on, or is in step again, if that is news.

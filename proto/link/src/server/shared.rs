@@ -86,6 +86,14 @@ impl Shared {
         }
     }
 
+    /// Tells that a client is gone, and why.
+    pub(crate) fn tell_left(&self, session: &Session, reason: String) {
+        self.tell(LinkEvent::Left {
+            status: session.status(self.clock.now_ns()),
+            reason,
+        });
+    }
+
     /// Ends the session of a client that may not be in any more; `false` if it left by itself just now: then that is told already.
     pub(crate) fn shut_out(&self, session: &Session, reason: String) -> bool {
         let is_in = self.sessions.remove(session.number);
@@ -93,10 +101,7 @@ impl Shared {
             tracing::info!(node = session.node, "shut out: {reason}");
             session.connection.close(CLOSE_REFUSED, reason.as_bytes());
             self.counters.shut_out.one();
-            self.tell(LinkEvent::Left {
-                status: session.status(self.clock.now_ns()),
-                reason,
-            });
+            self.tell_left(session, reason);
         }
         is_in
     }
