@@ -51,6 +51,15 @@ pub fn arrived(frame: u64) -> Arrive {
     }
 }
 
+/// The arrival at the frame after `shown`, with the moment when that was shown.
+fn swapped_at(shown: u64, swapped_ns: u64) -> Arrive {
+    Arrive {
+        swapped_frame: shown,
+        swapped_ns,
+        ..arrived(shown + 1)
+    }
+}
+
 pub fn released(master: &Master) -> u64 {
     master.newest().map_or(0, |newest| newest.frame)
 }
@@ -67,11 +76,7 @@ pub fn release_when_due(master: &mut Master) -> u64 {
 fn frames_keep_the_rhythm_while_all_are_in_time() {
     let (mut master, mut last) = in_step(Swap::Immediate, &[1, 2]);
     for _ in 0..100 {
-        let frame = released(&master) + 1;
-        for session in [1, 2] {
-            let _ = master.arrive(last + 5 * MS, session, &arrived(frame));
-        }
-        let now = release_when_due(&mut master);
+        let now = frame_in_time(&mut master, last);
         assert_eq!(now - last, PERIOD);
         last = now;
     }
@@ -83,11 +88,7 @@ fn a_planned_swap_keeps_the_rhythm_and_is_told_ahead() {
     let (mut master, mut last) = in_step(Swap::Scheduled, &[1, 2]);
     let mut last_swap = master.newest().map_or(0, |newest| newest.swap_ns);
     for _ in 0..100 {
-        let frame = released(&master) + 1;
-        for session in [1, 2] {
-            let _ = master.arrive(last + 5 * MS, session, &arrived(frame));
-        }
-        last = release_when_due(&mut master);
+        last = frame_in_time(&mut master, last);
         let swap = master.newest().map_or(0, |newest| newest.swap_ns);
         assert_eq!((swap - last, swap - last_swap), (300_000, PERIOD));
         last_swap = swap;
@@ -148,6 +149,12 @@ fn a_dead_node_is_left_after_ten_frames_and_out_after_half_a_second() {
 pub fn state_of(master: &Master, session: u16) -> Option<NodeState> {
     let mut members = master.members();
     members.find(|m| m.session == session).map(|m| m.state)
+}
+
+/// One frame for which nodes 1 and 2 arrive in time. The time of the next release.
+fn frame_in_time(master: &mut Master, last: u64) -> u64 {
+    let second = arrived(released(master) + 1);
+    frame_of_wall(master, last, Some((5 * MS, second)))
 }
 
 /// One frame of a wall: node 1 draws in 5 ms, node 2 says so where `second` has something to say. The time of the next release.
@@ -310,23 +317,12 @@ fn nodes_that_are_all_too_slow_are_shown_together_still() {
 fn swaps_are_compared_when_all_have_told() {
     let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
     let shown = released(&master);
-    let swapped_at = |ns| Arrive {
-        swapped_frame: shown,
-        swapped_ns: ns,
-        ..arrived(shown + 1)
+    let mut told = |session, after| {
+        let arrive = swapped_at(shown, last + after);
+        master.arrive(last + 5 * MS, session, &arrive).1
     };
-    assert_eq!(
-        master
-            .arrive(last + 5 * MS, 1, &swapped_at(last + 70_000))
-            .1,
-        None
-    );
-    let Some(skew) = master
-        .arrive(last + 5 * MS, 2, &swapped_at(last + 90_000))
-        .1
-    else {
-        panic!("both have told");
-    };
+    assert_eq!(told(1, 70_000), None);
+    let skew = told(2, 90_000).expect("both have told");
     assert_eq!(
         (skew.frame, skew.skew_ns, skew.overhead_ns),
         (shown, 20_000, 90_000)
@@ -365,10 +361,7 @@ fn a_wrong_picture_is_counted() {
 fn a_frame_that_nobody_began_is_refused() {
     let (mut master, last) = in_step(Swap::Immediate, &[1]);
     let ahead = arrived(released(&master) + 2);
-    assert_eq!(
-        master.arrive(last, 1, &ahead).0,
-        taut_proto::barrier::Answer::Refused
-    );
+    assert_eq!(master.arrive(last, 1, &ahead).0, Answer::Refused);
     assert_eq!(master.counts().refused, 1);
 }
 
@@ -394,10 +387,10 @@ fn a_node_that_hears_nothing_draws_on_its_own_again() {
     assert_eq!(node.turn(0), Turn::Free);
     assert!(node.message(0).is_some_and(|message| message.frame == 0));
     assert_eq!(node.message(1), None);
-    let mut head = taut_proto::barrier::ReleaseHead {
+    let mut head = ReleaseHead {
         term: 1,
         frame: 7,
-        ..Default::default()
+        ..ReleaseHead::default()
     };
     assert!(node.release(MS, &head));
     assert!(!node.release(MS, &head), "a copy");
@@ -423,15 +416,11 @@ fn a_node_that_hears_nothing_draws_on_its_own_again() {
 fn a_swap_that_cannot_have_been_is_not_measured() {
     let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
     let shown = released(&master);
-    let swapped_at = |ns| Arrive {
-        swapped_frame: shown,
-        swapped_ns: ns,
-        ..arrived(shown + 1)
-    };
     let now = last + 5 * MS;
-    assert_eq!(master.arrive(now, 1, &swapped_at(last)).1, None);
-    let impossible = now + SWAP_TOLD_NS + 1;
-    assert_eq!(master.arrive(now, 2, &swapped_at(impossible)).1, None);
+    for (session, swapped_ns) in [(1, last), (2, now + SWAP_TOLD_NS + 1)] {
+        let arrive = swapped_at(shown, swapped_ns);
+        assert_eq!(master.arrive(now, session, &arrive).1, None);
+    }
     release_when_due(&mut master);
     assert_eq!(master.newest().map(|newest| newest.skew_ns), Some(0));
 }

@@ -8,21 +8,12 @@ use taut_proto::{
     Untrusted, VersionRange, Wrap,
     codec::{MAX_LIST, MAX_TEXT_BYTES, decode, encode_onto},
     control::{Bye, LENGTH_BYTES, MAX_FRAME_BYTES, Offers, RefusalCode},
-    header::MAX_PAYLOAD_BYTES,
     mesh_blob::Positions,
     stats::DrawnState,
 };
 
-fn bytes_of(payload: &Payload) -> Vec<u8> {
-    let mut buffer = [0; MAX_PAYLOAD_BYTES];
-    match payload.encode_into(&mut buffer) {
-        Ok(used) => buffer[..used].to_vec(),
-        Err(error) => panic!("{error}"),
-    }
-}
-
 fn frame_of(message: &ControlMessage) -> Vec<u8> {
-    message.to_frame().unwrap_or_else(|error| panic!("{error}"))
+    must(message.to_frame())
 }
 
 #[test]
@@ -96,36 +87,18 @@ fn numbers_that_are_not_finite_travel_in_neither_direction() {
 
 #[test]
 fn a_count_beyond_the_bytes_that_came_is_refused_before_anything_is_taken() {
+    let too_long = |what, len, max| DecodeError::TooLong { what, len, max };
     // A name of 65535 bytes in a message of two.
-    assert_eq!(
-        decode::<Untrusted>(&[0xff, 0xff]),
-        Err(DecodeError::TooLong {
-            what: "text",
-            len: 65535,
-            max: 0
-        })
-    );
+    let text = decode::<Untrusted>(&[0xff, 0xff]);
+    assert_eq!(text, Err(too_long("text", 65535, 0)));
     // 2000 elements in four bytes.
-    let claim = [0xd0, 0x07, 0, 0];
-    assert_eq!(
-        decode::<Vec<u64>>(&claim),
-        Err(DecodeError::TooLong {
-            what: "list",
-            len: 2000,
-            max: 2
-        })
-    );
+    let list = decode::<Vec<u64>>(&[0xd0, 0x07, 0, 0]);
+    assert_eq!(list, Err(too_long("list", 2000, 2)));
     // More tools than a state holds.
     let mut state = bytes_of(&Payload::Hot(hot()));
     state[20] = 3;
-    assert_eq!(
-        decode::<HotState>(&state),
-        Err(DecodeError::TooLong {
-            what: "list",
-            len: 3,
-            max: 2
-        })
-    );
+    let state = decode::<HotState>(&state);
+    assert_eq!(state, Err(too_long("list", 3, 2)));
 }
 
 #[test]
@@ -226,8 +199,7 @@ fn tetrahedron() -> MeshBlob {
         [0.0, 0.0, 1.0],
     ];
     let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-    MeshBlob::new(Positions::F64(positions), triangles, None)
-        .unwrap_or_else(|error| panic!("{error}"))
+    must(MeshBlob::new(Positions::F64(positions), triangles, None))
 }
 
 #[test]
@@ -237,20 +209,20 @@ fn a_mesh_comes_back_in_both_precisions_with_and_without_all_its_parts() {
     let singles = double.positions_f64().into_iter().map(single).collect();
     for positions in [double.positions().clone(), Positions::F32(singles)] {
         for normals in [None, Some(vec![[0.0, 0.0, 1.0]; 4])] {
-            let mesh = MeshBlob::new(positions.clone(), double.triangles().to_vec(), normals)
-                .unwrap_or_else(|error| panic!("{error}"));
-            let finished = mesh.clone().with_finish(FINISH);
-            let finished = finished.unwrap_or_else(|error| panic!("{error}"));
+            let mesh = must(MeshBlob::new(
+                positions.clone(),
+                double.triangles().to_vec(),
+                normals,
+            ));
+            let finished = must(mesh.clone().with_finish(FINISH));
             let looks = Looks {
                 list: vec![look(0.25), look(1.0)],
                 of_triangles: vec![0, 1, 1, 0],
             };
-            let [patched, both] = [&mesh, &finished].map(|mesh| {
-                let mesh = mesh.clone().with_looks(looks.clone());
-                mesh.unwrap_or_else(|error| panic!("{error}"))
-            });
+            let [patched, both] =
+                [&mesh, &finished].map(|mesh| must(mesh.clone().with_looks(looks.clone())));
             for mesh in [mesh, finished, patched, both] {
-                let bytes = mesh.encode().unwrap_or_else(|error| panic!("{error}"));
+                let bytes = must(mesh.encode());
                 assert_eq!(MeshBlob::decode(&bytes), Ok(mesh));
             }
         }
@@ -270,33 +242,21 @@ fn looks_that_are_not_of_the_mesh_are_refused() {
         tetrahedron().with_looks(Looks { list, of_triangles })
     };
     let inconsistent = Err(DecodeError::Inconsistent { what: "mesh looks" });
-    assert_eq!(with(vec![], vec![]), inconsistent, "no look");
-    assert_eq!(
-        with(vec![], vec![0; 4]),
-        inconsistent,
-        "no look of those named"
-    );
-    assert_eq!(
-        with(vec![look(1.0)], vec![0; 3]),
-        inconsistent,
-        "a triangle without"
-    );
-    assert_eq!(
-        with(vec![look(1.0)], vec![0, 1, 0, 0]),
-        inconsistent,
-        "no second"
-    );
-    assert_eq!(
-        with(vec![look(1.0); 256], vec![0; 4]),
-        inconsistent,
-        "too many"
-    );
+    for (looks, of_triangles, what) in [
+        (0, vec![], "no look"),
+        (0, vec![0; 4], "no look of those named"),
+        (1, vec![0; 3], "a triangle without"),
+        (1, vec![0, 1, 0, 0], "no second"),
+        (256, vec![0; 4], "too many"),
+    ] {
+        let patched = with(vec![look(1.0); looks], of_triangles);
+        assert_eq!(patched, inconsistent, "{what}");
+    }
     for red in [-0.01, 1.01, f32::NAN] {
         assert!(with(vec![look(red)], vec![0; 4]).is_err(), "{red}");
     }
     let good = with(vec![look(1.0); 255], vec![0, 254, 0, 0]);
-    let bytes = good.map(|mesh| mesh.encode().unwrap_or_default());
-    let bytes = bytes.unwrap_or_default();
+    let bytes = must(must(good).encode());
     for length in 0..bytes.len() {
         let cut = MeshBlob::decode(&bytes[..length]);
         assert!(cut.is_err(), "cut to {length}");
@@ -331,20 +291,17 @@ fn patched() -> MeshBlob {
         list: vec![look(1.0), look(0.5), look(0.25)],
         of_triangles: vec![0, 1, 2, 0],
     };
-    let mesh = tetrahedron().with_looks(looks);
-    mesh.unwrap_or_else(|error| panic!("{error}"))
+    must(tetrahedron().with_looks(looks))
 }
 
 #[test]
 fn a_mesh_comes_back_with_its_textures_and_not_when_it_is_cut() {
     for finish in [None, Some(FINISH)] {
-        let mesh = patched().with_textures(textures());
-        let mut mesh = mesh.unwrap_or_else(|error| panic!("{error}"));
+        let mut mesh = must(patched().with_textures(textures()));
         if let Some(finish) = finish {
-            let finished = mesh.with_finish(finish);
-            mesh = finished.unwrap_or_else(|error| panic!("{error}"));
+            mesh = must(mesh.with_finish(finish));
         }
-        let bytes = mesh.encode().unwrap_or_else(|error| panic!("{error}"));
+        let bytes = must(mesh.encode());
         for length in 0..bytes.len() {
             let cut = MeshBlob::decode(&bytes[..length]);
             assert!(cut.is_err(), "cut to {length}");
@@ -382,9 +339,7 @@ fn textures_that_are_not_of_the_mesh_are_refused() {
     }
     assert!(tetrahedron().with_textures(textures()).is_err(), "no looks");
     // A way to go on that nobody knows, and a count beyond all bytes.
-    let mesh = patched().with_textures(textures());
-    let bytes = mesh.map(|mesh| mesh.encode().unwrap_or_default());
-    let bytes = bytes.unwrap_or_default();
+    let bytes = must(must(patched().with_textures(textures())).encode());
     let start = bytes.len() - (4 + 2 * 34 + 3 + 4 * 24);
     for (at, with) in [
         (start + 4 + 32, &[3][..]),
@@ -406,11 +361,7 @@ const FINISH: Finish = Finish {
 #[test]
 fn a_finish_out_of_its_range_is_refused() {
     let refused = |roughness: f32| {
-        let mesh = tetrahedron().with_finish(FINISH);
-        let mut bytes = mesh
-            .unwrap_or_else(|error| panic!("{error}"))
-            .encode()
-            .unwrap_or_default();
+        let mut bytes = must(must(tetrahedron().with_finish(FINISH)).encode());
         let at = bytes.len() - 8;
         bytes[at..at + 4].copy_from_slice(&roughness.to_le_bytes());
         let decoded = MeshBlob::decode(&bytes);
@@ -431,7 +382,7 @@ fn a_finish_out_of_its_range_is_refused() {
 
 #[test]
 fn a_broken_mesh_is_refused() {
-    let bytes = tetrahedron().encode().unwrap_or_default();
+    let bytes = must(tetrahedron().encode());
     for length in 0..bytes.len() {
         assert!(
             MeshBlob::decode(&bytes[..length]).is_err(),
@@ -444,29 +395,18 @@ fn a_broken_mesh_is_refused() {
         MeshBlob::decode(&bytes)
     };
     assert_eq!(bent(0, b"x"), Err(DecodeError::WrongMagic));
-    assert_eq!(
-        bent(8, &u32::MAX.to_le_bytes()),
-        Err(DecodeError::Inconsistent {
-            what: "mesh length"
-        })
-    );
-    assert_eq!(
-        bent(12, &u32::MAX.to_le_bytes()),
-        Err(DecodeError::Inconsistent {
-            what: "mesh length"
-        })
-    );
+    let inconsistent = |what| Err(DecodeError::Inconsistent { what });
+    for at in [8, 12] {
+        let bent = bent(at, &u32::MAX.to_le_bytes());
+        assert_eq!(bent, inconsistent("mesh length"), "{at}");
+    }
     assert_eq!(
         bent(16, &f64::NAN.to_le_bytes()),
         Err(DecodeError::NotFinite)
     );
     let first_index = 16 + 4 * 24;
-    assert_eq!(
-        bent(first_index, &4_u32.to_le_bytes()),
-        Err(DecodeError::Inconsistent {
-            what: "vertex index"
-        })
-    );
+    let bent = bent(first_index, &4_u32.to_le_bytes());
+    assert_eq!(bent, inconsistent("vertex index"));
 }
 
 proptest! {

@@ -7,7 +7,6 @@
 use crate::samples::*;
 use taut_proto::{
     Finish, Look, Looks, MeshBlob, Panorama, Texture, TextureUse, Textures, Wrap,
-    header::MAX_DATAGRAM_BYTES,
     mesh_blob::{MeshHash, Positions},
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
 };
@@ -24,68 +23,63 @@ fn hex(bytes: &[u8]) -> String {
 
 fn mesh() -> MeshBlob {
     let positions = Positions::F32(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-    MeshBlob::new(positions, vec![[0, 1, 2]], Some(vec![[0.0, 0.0, 1.0]; 3]))
-        .unwrap_or_else(|error| panic!("{error}"))
+    must(MeshBlob::new(
+        positions,
+        vec![[0, 1, 2]],
+        Some(vec![[0.0, 0.0, 1.0]; 3]),
+    ))
 }
 
 /// Every line of the golden file as this build makes it.
 fn made() -> Vec<(String, String)> {
     let sealer = Sealer::new(&material(), 0x0102_0304, 5);
     let mut lines = Vec::new();
+    let mut line = |name: String, bytes: &[u8]| lines.push((name, hex(bytes)));
     for (name, payload) in datagrams() {
-        let mut buffer = [0; MAX_DATAGRAM_BYTES];
-        let datagram = sealer
-            .seal(&payload, &mut buffer)
-            .unwrap_or_else(|error| panic!("{error}"));
-        lines.push((format!("datagram/{name}"), hex(datagram)));
+        line(format!("datagram/{name}"), &sealed(&sealer, &payload));
     }
     for (name, message) in messages() {
-        let frame = message.to_frame().unwrap_or_else(|error| panic!("{error}"));
-        lines.push((format!("message/{name}"), hex(&frame)));
+        line(format!("message/{name}"), &must(message.to_frame()));
     }
-    let blob = mesh().encode().unwrap_or_else(|error| panic!("{error}"));
-    lines.push(("mesh/hash".to_owned(), MeshHash::of(&blob).to_string()));
-    lines.push(("mesh/triangle".to_owned(), hex(&blob)));
-    let finished = mesh().with_finish(Finish {
-        roughness: 0.5,
+    let finish = |roughness| Finish {
+        roughness,
         metallic: 1.0,
-    });
-    let finished = finished.unwrap_or_else(|error| panic!("{error}"));
-    let blob = finished.encode().unwrap_or_else(|error| panic!("{error}"));
-    lines.push(("mesh/triangle-with-finish".to_owned(), hex(&blob)));
-    let patched = mesh().with_looks(Looks {
+    };
+    let texture = must(Texture::new(
+        (2, 1),
+        vec![[255, 0, 0, 255], [0, 0, 255, 128]],
+    ))
+    .encode();
+    let finished = must(mesh().with_finish(finish(0.5)));
+    let patched = must(mesh().with_looks(Looks {
         list: vec![Look {
             colour: [1.0, 0.5, 0.0],
-            finish: Finish {
-                roughness: 0.25,
-                metallic: 1.0,
-            },
+            finish: finish(0.25),
         }],
         of_triangles: vec![0],
-    });
-    let patched = patched.unwrap_or_else(|error| panic!("{error}"));
-    let blob = patched.encode().unwrap_or_else(|error| panic!("{error}"));
-    lines.push(("mesh/triangle-with-looks".to_owned(), hex(&blob)));
-    let texture = Texture::new((2, 1), vec![[255, 0, 0, 255], [0, 0, 255, 128]]);
-    let texture = texture.unwrap_or_else(|error| panic!("{error}")).encode();
-    lines.push(("texture/two-texels".to_owned(), hex(&texture)));
-    let pictured = patched.with_textures(Textures {
+    }));
+    let pictured = must(patched.clone().with_textures(Textures {
         list: vec![TextureUse {
             texture: MeshHash::of(&texture),
             wrap: [Wrap::Mirror, Wrap::Clamp],
         }],
         of_looks: vec![Some(0)],
         coordinates: vec![[[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]],
-    });
-    let pictured = pictured.unwrap_or_else(|error| panic!("{error}"));
-    let blob = pictured.encode().unwrap_or_else(|error| panic!("{error}"));
-    lines.push(("mesh/triangle-with-textures".to_owned(), hex(&blob)));
+    }));
     let panorama = Panorama::from_fn(|column, row| [column as f32, row as f32, 0.5]).encode();
-    lines.push((
-        "panorama/hash".to_owned(),
-        MeshHash::of(&panorama).to_string(),
-    ));
-    lines.push(("panorama/first-texels".to_owned(), hex(&panorama[..16])));
+    let triangle = must(mesh().encode());
+    line("mesh/hash".to_owned(), &MeshHash::of(&triangle).bytes);
+    line("mesh/triangle".to_owned(), &triangle);
+    for (name, mesh) in [("finish", finished), ("looks", patched)] {
+        line(format!("mesh/triangle-with-{name}"), &must(mesh.encode()));
+    }
+    line("texture/two-texels".to_owned(), &texture);
+    line(
+        "mesh/triangle-with-textures".to_owned(),
+        &must(pictured.encode()),
+    );
+    line("panorama/hash".to_owned(), &MeshHash::of(&panorama).bytes);
+    line("panorama/first-texels".to_owned(), &panorama[..16]);
     lines
 }
 

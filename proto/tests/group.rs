@@ -1,6 +1,6 @@
 //! Group keys: who may say what under them, and how generations change.
 
-use crate::samples;
+use crate::samples::{self, must, sealed};
 
 use proptest::prelude::*;
 use taut_proto::{
@@ -45,10 +45,7 @@ fn turn(opener: &mut GroupOpener, own: u16, generation: u32, now_ns: u64) {
 
 fn seal(sealer: &mut GroupSealer, payload: &Payload, now_ns: u64) -> Vec<u8> {
     let mut buffer = [0; MAX_DATAGRAM_BYTES];
-    match sealer.seal(payload, now_ns, &mut buffer) {
-        Ok(datagram) => datagram.to_vec(),
-        Err(error) => panic!("{error}"),
-    }
+    must(sealer.seal(payload, now_ns, &mut buffer)).to_vec()
 }
 
 #[test]
@@ -57,9 +54,7 @@ fn the_server_speaks_to_all_members_and_each_datagram_counts_once() {
     let datagram = seal(&mut sealer(SERVER_SENDER, 1), &state, 0);
     for own in [LEFT, RIGHT] {
         let mut opener = opener(own, 1);
-        let opened = opener
-            .open(&datagram, 0)
-            .unwrap_or_else(|error| panic!("{error}"));
+        let opened = must(opener.open(&datagram, 0));
         assert_eq!(opened.payload, state);
         assert_eq!(opened.header.flags, FLAG_GROUP | 1);
         assert_eq!(opener.open(&datagram, 0), Err(OpenError::Replayed));
@@ -107,18 +102,14 @@ fn a_group_key_carries_pictures_frames_between_nodes_and_signs_of_life_only() {
 /// A member that turned bad has the secret and may seal anything with code of its own.
 #[test]
 fn what_a_bad_member_seals_all_the_same_is_refused() {
-    let right = opener(RIGHT, 1);
-    let mut right = right;
+    let mut right = opener(RIGHT, 1);
     let material = group(1).material(LEFT);
     // Under the right key, yet without the group's flag: the key alone does not make it pairwise, nor grouped.
     let pairwise = Sealer::new(&material, EPOCH, LEFT);
-    let mut buffer = [0; MAX_DATAGRAM_BYTES];
     for (name, payload) in samples::datagrams() {
-        let datagram = pairwise
-            .seal(&payload, &mut buffer)
-            .unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(right.open(datagram, 0), Err(OpenError::Forged), "{name}");
-        let mut flagged = datagram.to_vec();
+        let datagram = sealed(&pairwise, &payload);
+        assert_eq!(right.open(&datagram, 0), Err(OpenError::Forged), "{name}");
+        let mut flagged = datagram;
         flagged[10..12].copy_from_slice(&(FLAG_GROUP | 1).to_le_bytes());
         let refused = right.open(&flagged, 0).expect_err("it was not sealed so");
         let expected = match may_carry(payload.kind(), LEFT) {

@@ -2,6 +2,7 @@
 
 use std::mem::MaybeUninit;
 
+use crate::samples::must;
 use proptest::prelude::*;
 use taut_proto::{
     ClusterKey, Credential, Holder, JoinKey, Role, ServerPin,
@@ -12,11 +13,11 @@ use taut_proto::{
 };
 
 fn key(digit: char) -> ClusterKey {
-    ClusterKey::parse(&digit.to_string().repeat(64)).unwrap_or_else(|error| panic!("{error}"))
+    must(ClusterKey::parse(&digit.to_string().repeat(64)))
 }
 
 fn node(name: &str) -> Holder {
-    Holder::of(name).unwrap_or_else(|error| panic!("{error}"))
+    must(Holder::of(name))
 }
 
 fn roles() -> impl Strategy<Value = Role> {
@@ -25,7 +26,7 @@ fn roles() -> impl Strategy<Value = Role> {
 
 #[test]
 fn a_key_survives_its_file() {
-    let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
+    let key = must(ClusterKey::generate());
     assert_eq!(
         ClusterKey::parse(&format!("  {}\n", key.to_hex())),
         Ok(key.clone())
@@ -70,7 +71,7 @@ fn two_keys_differ() {
 
 #[test]
 fn a_secret_is_not_shown_by_accident() {
-    let key = ClusterKey::parse(&"ab".repeat(32)).unwrap_or_else(|error| panic!("{error}"));
+    let key = must(ClusterKey::parse(&"ab".repeat(32)));
     assert!(!format!("{key:?}").contains("ab"));
     let credential = key.credential(Role::Render, node("front"), 1);
     let text = credential.to_text();
@@ -193,7 +194,7 @@ fn every_damage_of_a_credential_file_is_noticed() {
         );
         let mut bytes = text.clone().into_bytes();
         bytes[at] = if bytes[at] == b'1' { b'2' } else { b'1' };
-        let changed = String::from_utf8(bytes).unwrap_or_else(|error| panic!("{error}"));
+        let changed = must(String::from_utf8(bytes));
         assert!(Credential::parse(&changed).is_err(), "{at} of\n{changed}");
     }
     assert_eq!(

@@ -1,6 +1,6 @@
 //! Sealing and opening take no memory: across a roll of keys, under group keys, and with events to repeat.
 
-use crate::samples;
+use crate::samples::{self, must};
 
 use assert_no_alloc::assert_no_alloc;
 use taut_proto::{
@@ -44,9 +44,7 @@ fn a_change_of_generation_takes_no_memory_where_datagrams_are_sealed_and_opened(
     }
     let mut payload = [0; MAX_DATAGRAM_BYTES];
     let state = Payload::Hot(samples::hot());
-    let length = state
-        .encode_into(&mut payload)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let length = must(state.encode_into(&mut payload));
     let mut buffer = [0; MAX_DATAGRAM_BYTES];
     let mut opened = 0;
     assert_no_alloc(|| {

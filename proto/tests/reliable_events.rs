@@ -1,5 +1,6 @@
 //! Discrete events over a bad network: each once, in order, whatever happens to the states.
 
+use crate::samples::varied;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 use taut_proto::{
@@ -164,18 +165,12 @@ struct Fate {
 }
 
 fn fate() -> impl Strategy<Value = Fate> {
-    (
-        prop::bool::weighted(0.1),
-        prop::bool::weighted(0.01),
-        prop_oneof![4 => Just(0u64), 1 => 0u64..10],
-        prop::bool::weighted(0.1),
-    )
-        .prop_map(|(lost, burst, late_ms, twice)| Fate {
-            lost,
-            burst,
-            late_ms,
-            twice,
-        })
+    varied!(Fate {
+        lost: prop::bool::weighted(0.1),
+        burst: prop::bool::weighted(0.01),
+        late_ms: prop_oneof![4 => Just(0u64), 1 => 0u64..10],
+        twice: prop::bool::weighted(0.1),
+    })
 }
 
 proptest! {

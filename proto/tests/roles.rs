@@ -1,5 +1,6 @@
 //! What each role may do, and who is shut out.
 
+use crate::samples::must;
 use taut_proto::{
     Act, JoinPolicy, Revoked, Role,
     proof::{Claim, Grant},
@@ -43,7 +44,7 @@ fn acts_have_bits_of_their_own_and_roles_their_names() {
 }
 
 fn entry(text: &str) -> Revoked {
-    text.parse().unwrap_or_else(|error| panic!("{error}"))
+    must(text.parse())
 }
 
 #[test]

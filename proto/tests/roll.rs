@@ -1,5 +1,6 @@
 //! Keys that roll: no gap, no second use of a nonce, no way back for an attacker.
 
+use crate::samples::{must, sealed};
 use proptest::prelude::*;
 use std::collections::HashSet;
 use taut_proto::{
@@ -17,12 +18,10 @@ fn pair() -> (Sealer, Opener) {
 }
 
 fn seal(sealer: &Sealer, value: u64) -> Vec<u8> {
-    let mut buffer = [0; MAX_DATAGRAM_BYTES];
-    let payload = Payload::TimeRequest(TimeRequest { client_sent: value });
-    match sealer.seal(&payload, &mut buffer) {
-        Ok(datagram) => datagram.to_vec(),
-        Err(error) => panic!("{error}"),
-    }
+    sealed(
+        sealer,
+        &Payload::TimeRequest(TimeRequest { client_sent: value }),
+    )
 }
 
 fn sequence(datagram: &[u8]) -> u64 {
@@ -36,9 +35,7 @@ fn a_whole_generation_is_sealed_and_opened_and_the_next_one_goes_on() {
     let (sealer, mut opener) = pair();
     let mut buffer = [0; MAX_DATAGRAM_BYTES];
     for number in 0..ROLL_PACKETS + 2 * WINDOW {
-        let datagram = sealer
-            .seal(&Payload::Heartbeat, &mut buffer)
-            .unwrap_or_else(|error| panic!("{error}"));
+        let datagram = must(sealer.seal(&Payload::Heartbeat, &mut buffer));
         let opened = opener
             .open(datagram)
             .unwrap_or_else(|error| panic!("{number}: {error}"));
@@ -52,8 +49,7 @@ fn a_key_is_left_after_an_hour_and_what_was_left_out_is_not_missing() {
     let start = 5 * ROLL_NS; // any clock
     let mut counts = |sealer: &Sealer| {
         let datagram = seal(sealer, 1);
-        let opened = opener.open(&datagram);
-        let opened = opened.unwrap_or_else(|error| panic!("{error}"));
+        let opened = must(opener.open(&datagram));
         (opened.header.sequence, opened.expected)
     };
     sealer.roll_by_time(start);

@@ -1,5 +1,6 @@
 //! Sealed datagrams: what is sealed opens once; anything else is refused.
 
+use crate::samples::{must, sealed};
 use proptest::prelude::*;
 use taut_proto::{
     ArrayVec, DecodeError, HotState, InputSample, Kind, PROTOCOL_VERSION, Payload, PoseF32,
@@ -26,14 +27,6 @@ fn pair() -> (Sealer, Opener) {
 
 fn buffer() -> DatagramBuffer {
     [0; MAX_DATAGRAM_BYTES]
-}
-
-fn sealed(sealer: &Sealer, payload: &Payload) -> Vec<u8> {
-    let mut buffer = buffer();
-    match sealer.seal(payload, &mut buffer) {
-        Ok(datagram) => datagram.to_vec(),
-        Err(error) => panic!("{error}"),
-    }
 }
 
 fn input(index: u64) -> Payload {
@@ -92,9 +85,7 @@ fn the_fullest_state_fits_a_quic_datagram_at_the_smallest_mtu() {
     let datagram = sealed(&sealer, &Payload::Hot(state.clone()));
     assert_eq!(datagram.len(), 1036);
     assert!(datagram.len() <= MAX_DATAGRAM_BYTES);
-    let opened = opener
-        .open(&datagram)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let opened = must(opener.open(&datagram));
     assert_eq!(opened.payload, Payload::Hot(state.clone()));
     assert_eq!(Ok(opened.state_hash), state.hash());
 }
@@ -175,9 +166,7 @@ fn another_version_is_named() {
 fn a_good_seal_on_nonsense_is_an_error_of_the_payload() {
     let (sealer, mut opener) = pair();
     let mut buffer = buffer();
-    let datagram = sealer
-        .seal_bytes(Kind::Input, &[0xff; 3], &mut buffer)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let datagram = must(sealer.seal_bytes(Kind::Input, &[0xff; 3], &mut buffer));
     assert_eq!(
         opener.open(datagram),
         Err(OpenError::Payload(DecodeError::Truncated))
@@ -189,9 +178,7 @@ fn the_payload_is_not_readable_on_the_way() {
     let (sealer, _) = pair();
     let mut buffer = buffer();
     let secret = [0x42; 64];
-    let datagram = sealer
-        .seal_bytes(Kind::Hot, &secret, &mut buffer)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let datagram = must(sealer.seal_bytes(Kind::Hot, &secret, &mut buffer));
     assert!(
         !datagram[HEADER_BYTES..]
             .windows(4)

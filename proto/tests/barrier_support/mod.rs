@@ -8,7 +8,7 @@ use taut_proto::barrier::{
     Succession, Successor, Swap, Turn,
 };
 
-use crate::clock::Random;
+use crate::{clock::Random, samples::varied};
 
 const MS: u64 = 1_000_000;
 /// Step of the virtual clock, ns.
@@ -44,42 +44,31 @@ struct NodePlan {
     stops: Option<(u64, u64)>,
 }
 
+fn ms(range: std::ops::Range<u64>) -> impl Strategy<Value = u64> {
+    range.prop_map(|ms| ms * MS)
+}
+
 fn any_plan() -> impl Strategy<Value = NodePlan> {
-    (
-        0_u64..400,
-        (1_u64..60, 1_u64..200),
-        prop::option::weighted(0.2, 500_u64..2000),
-        prop::option::weighted(0.3, (500_u64..1200, 10_u64..900)),
-    )
-        .prop_map(|(starts, (low, more), dies, stops)| NodePlan {
-            starts: starts * MS,
-            draw: (low, low + more),
-            dies: dies.map(|ms| ms * MS),
-            stops: stops.map(|(at, long)| (at * MS, long * MS)),
-        })
+    varied!(NodePlan {
+        starts: ms(0..400),
+        draw: (1_u64..60, 1_u64..200).prop_map(|(low, more)| (low, low + more)),
+        dies: prop::option::weighted(0.2, ms(500..2000)),
+        stops: prop::option::weighted(0.3, (ms(500..1200), ms(10..900))),
+    })
 }
 
 pub fn any_world() -> impl Strategy<Value = World> {
-    (
-        prop::collection::vec(any_plan(), 1..5),
-        prop_oneof![Just(Swap::Immediate), Just(Swap::Scheduled)],
-        prop_oneof![Just(8_333_333_u64), Just(16_666_667), Just(100 * MS)],
-        (0_u64..300, 0_u64..300, 0_u64..30),
-        any::<u64>(),
-    )
-        .prop_map(
-            |(nodes, swap, period_ns, (lost, doubled, delay), seed)| World {
-                nodes,
-                swap,
-                period_ns,
-                lost,
-                doubled,
-                delay,
-                server_dies: None,
-                server_pauses: None,
-                seed,
-            },
-        )
+    varied!(World {
+        nodes: prop::collection::vec(any_plan(), 1..5),
+        swap: prop_oneof![Just(Swap::Immediate), Just(Swap::Scheduled)],
+        period_ns: prop_oneof![Just(8_333_333_u64), Just(16_666_667), Just(100 * MS)],
+        lost: 0_u64..300,
+        doubled: 0_u64..300,
+        delay: 0_u64..30,
+        server_dies: Just(None),
+        server_pauses: Just(None),
+        seed: any::<u64>(),
+    })
 }
 
 pub fn any_world_without_server() -> impl Strategy<Value = World> {
@@ -276,14 +265,8 @@ impl World {
             delay: self.delay,
             under_way: Vec::new(),
         };
-        let mut server = Leading {
-            master: Master::new(self.settings(), SERVER, 1, 1),
-            state: Newest::default(),
-            sent: Newest::default(),
-            allowed: 0,
-            last: None,
-            again: None,
-        };
+        let master = Master::new(self.settings(), SERVER, 1, 1);
+        let mut server = Leading::new(master, Newest::default());
         let mut screens: Vec<_> = (1_u16..)
             .zip(&self.nodes)
             .map(|(id, plan)| Screen {
@@ -360,13 +343,9 @@ impl World {
     }
 
     fn step(&self, now: u64, screen: &mut Screen, network: &mut Network, seen: &mut Seen) {
-        if screen
-            .node
-            .newest()
-            .is_none_or(|newest| newest.master == SERVER)
-        {
-            let heard = screen.heard_server;
-            screen.succession.hear(heard);
+        let newest = screen.node.newest();
+        if newest.is_none_or(|newest| newest.master == SERVER) {
+            screen.succession.hear(screen.heard_server);
         }
         if self.server_dies.is_some() || self.server_pauses.is_some() {
             self.succeed(now, screen, network, seen);
@@ -393,14 +372,7 @@ impl World {
                 let mut master = Master::new(self.settings(), screen.id, term, first);
                 let members = screen.node.newest().map(|newest| newest.members.clone());
                 master.expect(now, &members.unwrap_or_default());
-                screen.leading = Some(Leading {
-                    master,
-                    state: screen.tuple,
-                    sent: screen.tuple,
-                    allowed: 0,
-                    last: None,
-                    again: None,
-                });
+                screen.leading = Some(Leading::new(master, screen.tuple));
             }
         }
         if let Some(term) = &mut screen.leading {
@@ -410,6 +382,17 @@ impl World {
 }
 
 impl Leading {
+    fn new(master: Master, state: Newest) -> Leading {
+        Leading {
+            master,
+            state,
+            sent: state,
+            allowed: 0,
+            last: None,
+            again: None,
+        }
+    }
+
     fn answer(&mut self, now: u64, from: u16, arrive: &Arrive, network: &mut Network) {
         let (answer, _) = self.master.arrive(now, from, arrive);
         if answer == Answer::Repeat

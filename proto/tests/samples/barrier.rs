@@ -44,67 +44,43 @@ pub fn release() -> Release {
 }
 
 pub fn any_arrive() -> impl Strategy<Value = Arrive> {
-    (
-        (far(), far(), far(), any::<u64>(), far()),
-        (
-            any::<u32>(),
-            (far(), far()),
-            (far(), far()),
-            any::<u32>(),
-            0..=100_000_000_u32,
-        ),
-    )
-        .prop_map(
-            |(
-                (term, frame, ready_ns, state_hash, state_time_ns),
-                (missed, (swapped_frame, swapped_ns), (lit_frame, lit_ns), draw_us, period_us),
-            )| Arrive {
-                term,
-                frame,
-                ready_ns,
-                state_hash,
-                state_time_ns,
-                missed,
-                swapped_frame,
-                swapped_ns,
-                lit_frame,
-                lit_ns,
-                draw_us,
-                period_us,
-            },
-        )
+    varied!(Arrive {
+        term: far(),
+        frame: far(),
+        ready_ns: far(),
+        state_hash: any::<u64>(),
+        state_time_ns: far(),
+        missed: any::<u32>(),
+        swapped_frame: far(),
+        swapped_ns: far(),
+        lit_frame: far(),
+        lit_ns: far(),
+        draw_us: any::<u32>(),
+        period_us: 0..=100_000_000_u32,
+    })
 }
 
 pub fn any_release() -> impl Strategy<Value = Release> {
     let members = prop::collection::btree_set(any::<u16>(), 0..=MAX_MEMBERS);
-    (
-        (far(), any::<u16>(), far(), far()),
-        (0..=1_000_000_u32, any::<u32>(), any::<u32>(), any::<u32>()),
-        members,
-        any_hot(),
-    )
-        .prop_map(
-            |(
-                (term, master, frame, swap_ns),
-                (period_us, skew_ns, waited, late),
-                members,
-                state,
-            )| {
-                let of_members = ((1_u64 << members.len()) - 1) as u32;
-                Release {
-                    head: ReleaseHead {
-                        term,
-                        master,
-                        frame,
-                        swap_ns,
-                        period_us,
-                        skew_ns,
-                        waited: waited & of_members,
-                        late: late & of_members,
-                        members: members.into_iter().collect(),
-                    },
-                    state,
-                }
-            },
-        )
+    let head = varied!(ReleaseHead {
+        term: far(),
+        master: any::<u16>(),
+        frame: far(),
+        swap_ns: far(),
+        period_us: 0..=1_000_000_u32,
+        skew_ns: any::<u32>(),
+        waited: any::<u32>(),
+        late: any::<u32>(),
+        members: members.prop_map(ArrayVec::from_iter),
+    });
+    let head = head.prop_map(|mut head| {
+        let of_members = ((1_u64 << head.members.len()) - 1) as u32;
+        head.waited &= of_members;
+        head.late &= of_members;
+        head
+    });
+    varied!(Release {
+        head,
+        state: any_hot(),
+    })
 }

@@ -59,40 +59,30 @@ pub fn part() -> ConstraintPart {
 
 /// As many rows as a datagram surely holds, at any place of a set.
 pub fn any_part() -> impl Strategy<Value = ConstraintPart> {
+    let head = varied!(SetHead {
+        sequence: far(),
+        made_ns: far(),
+        device_ns: far(),
+        pose: pose64(),
+        flags: 0_u8..4,
+    });
     (
-        (far(), far(), far()),
-        pose64(),
-        0_u8..4,
+        head,
         (1..=MAX_PARTS as u8).prop_flat_map(|parts| (0..parts, Just(parts))),
         prop::collection::vec(any_row(), 0..=11.min(MAX_PART_ROWS)),
         (0..=MAX_SET_ROWS as u16 - 11).prop_flat_map(|first| (Just(first), 0..=first)),
     )
-        .prop_map(
-            |(
-                (sequence, made_ns, device_ns),
-                pose,
-                flags,
-                (part, parts),
-                rows,
-                (before, after),
-            )| {
-                let first_row = before - after;
-                ConstraintPart {
-                    head: SetHead {
-                        sequence,
-                        made_ns,
-                        device_ns,
-                        pose,
-                        flags,
-                    },
-                    rows_in_set: first_row + rows.len() as u16 + after,
-                    part,
-                    parts,
-                    first_row,
-                    rows: ArrayVec::from_iter(rows),
-                }
-            },
-        )
+        .prop_map(|(head, (part, parts), rows, (before, after))| {
+            let first_row = before - after;
+            ConstraintPart {
+                head,
+                rows_in_set: first_row + rows.len() as u16 + after,
+                part,
+                parts,
+                first_row,
+                rows: ArrayVec::from_iter(rows),
+            }
+        })
 }
 
 pub fn any_row() -> impl Strategy<Value = ConstraintRow> {
@@ -107,28 +97,21 @@ pub fn any_row() -> impl Strategy<Value = ConstraintRow> {
         (three(), unit(), size32()).prop_map(|(c, a, r)| RowSeparation::OfRim(c, a, r)),
         (two(), prop::array::uniform2(size32())).prop_map(|(u, r)| RowSeparation::OfRods(u, r)),
     ];
-    let feature = || (0_u8..16, any::<u32>()).prop_map(|(kind, index)| RowFeature { kind, index });
-    let moved = prop_oneof![Just([0.0_f32; 3]), three()];
-    (
-        any::<u16>(),
-        (feature(), feature()),
-        (three(), unit(), finite32(), moved),
+    let feature = || {
+        varied!(RowFeature {
+            kind: 0_u8..16,
+            index: any::<u32>(),
+        })
+    };
+    varied!(ConstraintRow {
+        obstacle: any::<u16>(),
+        on_body: feature(),
+        on_obstacle: feature(),
+        arm: three(),
+        normal: unit(),
+        gap: finite32(),
+        obstacle_displacement: prop_oneof![Just([0.0_f32; 3]), three()],
         separation,
-        prop::option::of(unit()),
-    )
-        .prop_map(
-            |(obstacle, (on_body, on_obstacle), (arm, normal, gap, moved), separation, shading)| {
-                ConstraintRow {
-                    obstacle,
-                    on_body,
-                    on_obstacle,
-                    arm,
-                    normal,
-                    gap,
-                    obstacle_displacement: moved,
-                    separation,
-                    shading_normal: shading,
-                }
-            },
-        )
+        shading_normal: prop::option::of(unit()),
+    })
 }

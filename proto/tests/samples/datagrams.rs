@@ -107,31 +107,33 @@ fn confirmation() -> Confirmation {
 }
 
 pub fn any_payload() -> impl Strategy<Value = Payload> {
-    let response = (far(), far(), far()).prop_map(|(client_sent, server_received, server_sent)| {
-        Payload::TimeResponse(TimeResponse {
-            client_sent,
-            server_received,
-            server_sent,
-        })
+    let response = varied!(TimeResponse {
+        client_sent: far(),
+        server_received: far(),
+        server_sent: far(),
     });
-    let head = ((far(), far()), pose64()).prop_map(|((sample_time_ns, index), pose)| {
-        Payload::Head(HeadSample {
-            sample_time_ns,
-            index,
-            pose,
-        })
+    let head = varied!(HeadSample {
+        sample_time_ns: far(),
+        index: far(),
+        pose: pose64(),
+    });
+    let passed = varied!(PassedForce {
+        sample: any_force(),
+        hold_ns: far(),
+        ramp_out_ns: far(),
+        flags: any::<u16>(),
     });
     prop_oneof![
         any_force().prop_map(Payload::Force),
-        any_passed_force().prop_map(Payload::PassedForce),
+        passed.prop_map(Payload::PassedForce),
         any_hot().prop_map(Payload::Hot),
         far().prop_map(|client_sent| Payload::TimeRequest(TimeRequest { client_sent })),
-        response,
+        response.prop_map(Payload::TimeResponse),
         Just(Payload::Heartbeat),
         any_input().prop_map(Payload::Input),
         any_wrench().prop_map(Payload::Wrench),
         any_part().prop_map(Payload::Constraints),
-        head,
+        head.prop_map(Payload::Head),
         any_arrive().prop_map(Payload::Arrive),
         any_release().prop_map(Payload::Release),
         any_confirmation().prop_map(Payload::Confirm),
@@ -145,54 +147,35 @@ fn six() -> impl Strategy<Value = [f64; 6]> {
 }
 
 fn any_input() -> impl Strategy<Value = InputSample> {
-    let numbers = (far(), far(), far(), any::<u16>(), any::<u16>(), far());
-    (numbers, pose64(), six(), six()).prop_map(|(numbers, pose, velocity, rendered)| {
-        let (sample_time_ns, clock_uncertainty_ns, index, buttons, flags, set_made_ns) = numbers;
-        InputSample {
-            sample_time_ns,
-            clock_uncertainty_ns,
-            index,
-            pose,
-            velocity,
-            buttons,
-            flags,
-            rendered,
-            set_made_ns,
-        }
+    varied!(InputSample {
+        sample_time_ns: far(),
+        clock_uncertainty_ns: far(),
+        index: far(),
+        pose: pose64(),
+        velocity: six(),
+        buttons: any::<u16>(),
+        flags: any::<u16>(),
+        rendered: six(),
+        set_made_ns: far(),
     })
 }
 
 fn any_wrench() -> impl Strategy<Value = WrenchCommand> {
-    ((far(), far(), any::<u16>()), six(), -1e9..1e9).prop_map(
-        |((time_ns, origin_ns, flags), wrench, obstacle_work)| WrenchCommand {
-            time_ns,
-            origin_ns,
-            wrench,
-            obstacle_work,
-            flags,
-        },
-    )
+    varied!(WrenchCommand {
+        time_ns: far(),
+        origin_ns: far(),
+        wrench: six(),
+        obstacle_work: -1e9..1e9,
+        flags: any::<u16>(),
+    })
 }
 
 fn any_force() -> impl Strategy<Value = ForceSample> {
-    ((far(), far(), far()), six()).prop_map(
-        |((sample_time_ns, clock_uncertainty_ns, index), wrench)| ForceSample {
-            sample_time_ns,
-            clock_uncertainty_ns,
-            index,
-            wrench,
-        },
-    )
-}
-
-fn any_passed_force() -> impl Strategy<Value = PassedForce> {
-    (any_force(), far(), far(), any::<u16>()).prop_map(|(sample, hold_ns, ramp_out_ns, flags)| {
-        PassedForce {
-            sample,
-            hold_ns,
-            ramp_out_ns,
-            flags,
-        }
+    varied!(ForceSample {
+        sample_time_ns: far(),
+        clock_uncertainty_ns: far(),
+        index: far(),
+        wrench: six(),
     })
 }
 

@@ -66,90 +66,62 @@ pub fn any_hot() -> impl Strategy<Value = HotState> {
         RunState::Paused,
         RunState::Fault,
     ]);
-    let head = (pose32(), any::<i32>(), 0.0..=1.0_f32, any::<u32>()).prop_map(
-        |(pose, age_us, eye_separation, flags)| HeadState {
-            pose,
-            age_us,
-            eye_separation,
-            flags,
-        },
-    );
-    let body = (any::<(u16, u16)>(), pose32()).prop_map(|((id, flags), pose)| BodyState {
-        id,
-        flags,
-        pose,
+    let head = varied!(HeadState {
+        pose: pose32(),
+        age_us: any::<i32>(),
+        eye_separation: 0.0..=1.0_f32,
+        flags: any::<u32>(),
     });
-    let event =
-        any::<(u32, u32, u32)>().prop_map(|(id, tick, code)| EventRecord { id, tick, code });
-    (
-        (far(), far(), any::<u32>(), any::<u32>()),
+    let body = varied!(BodyState {
+        id: any::<u16>(),
+        flags: any::<u16>(),
+        pose: pose32(),
+    });
+    let event = varied!(EventRecord {
+        id: any::<u32>(),
+        tick: any::<u32>(),
+        code: any::<u32>(),
+    });
+    varied!(HotState {
+        sample_time_ns: far(),
+        tick: far(),
+        scene_revision: any::<u32>(),
         run,
+        constraint_age_us: any::<u32>(),
         head,
-        list(tool()),
-        list(body),
-        list(contact()),
-        list(event),
-    )
-        .prop_map(
-            |(
-                (sample_time_ns, tick, scene_revision, constraint_age_us),
-                run,
-                head,
-                tools,
-                bodies,
-                contacts,
-                events,
-            )| HotState {
-                sample_time_ns,
-                tick,
-                scene_revision,
-                run,
-                constraint_age_us,
-                head,
-                tools,
-                bodies,
-                contacts,
-                events,
-            },
-        )
+        tools: list(tool()),
+        bodies: list(body),
+        contacts: list(contact()),
+        events: list(event),
+    })
 }
 
 fn tool() -> impl Strategy<Value = ToolState> {
-    let vectors = prop::array::uniform4(prop::array::uniform3(finite32()));
-    (pose32(), pose32(), vectors, any::<(u16, u16, u32)>()).prop_map(
-        |(god_object, device, vectors, (buttons, flags, id))| {
-            let [linear_velocity, angular_velocity, force, torque] = vectors;
-            ToolState {
-                god_object,
-                device,
-                linear_velocity,
-                angular_velocity,
-                force,
-                torque,
-                buttons,
-                flags,
-                id,
-            }
-        },
-    )
+    varied!(ToolState {
+        god_object: pose32(),
+        device: pose32(),
+        linear_velocity: vector(),
+        angular_velocity: vector(),
+        force: vector(),
+        torque: vector(),
+        buttons: any::<u16>(),
+        flags: any::<u16>(),
+        id: any::<u32>(),
+    })
+}
+
+fn vector() -> impl Strategy<Value = [f32; 3]> {
+    prop::array::uniform3(finite32())
 }
 
 /// Contacts with normals that survive the rounding unchanged: the axes.
 fn contact() -> impl Strategy<Value = ContactState> {
     let axes = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
-    let normal = prop::sample::select(axes.to_vec());
-    (
-        any::<[u16; 2]>(),
-        prop::array::uniform3(finite32()),
-        normal,
-        finite32(),
-        finite32(),
-    )
-        .prop_map(|(pair, point, normal, force, gap)| ContactState {
-            pair,
-            point,
-            normal,
-            force,
-            gap,
-        })
+    varied!(ContactState {
+        pair: any::<[u16; 2]>(),
+        point: vector(),
+        normal: prop::sample::select(axes.to_vec()),
+        force: finite32(),
+        gap: finite32(),
+    })
 }

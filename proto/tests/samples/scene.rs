@@ -69,52 +69,55 @@ pub fn scene() -> SceneDescription {
     }
 }
 
+fn text(pattern: &'static str) -> impl Strategy<Value = Untrusted> {
+    pattern.prop_map(Untrusted::from)
+}
+
+/// Fewer than so many texts.
+fn texts(most: usize) -> impl Strategy<Value = Vec<Untrusted>> {
+    prop::collection::vec(text(".{0,9}"), 0..most)
+}
+
+fn vector() -> impl Strategy<Value = [f64; 3]> {
+    prop::array::uniform3(finite64())
+}
+
+fn hash() -> impl Strategy<Value = MeshHash> {
+    varied!(MeshHash {
+        bytes: any::<[u8; 32]>(),
+    })
+}
+
 fn any_output() -> impl Strategy<Value = OutputDescription> {
-    let files = || {
-        prop::collection::vec(".{0,9}", 0..3)
-            .prop_map(|names| names.into_iter().map(Untrusted::from).collect())
-    };
-    let numbers = (
-        0.1..=8.0_f64,
-        prop::collection::vec(-16.0..=16.0_f64, 9),
-        prop::array::uniform3(0.0..=8.0_f64),
-        0.25..=4.0_f64,
-    );
-    (files(), files(), files(), numbers).prop_map(
-        |(warp, surface, blend, (blend_gamma, colour, gamma, sampling))| OutputDescription {
-            warp,
-            surface,
-            blend,
-            blend_gamma,
-            colour: std::array::from_fn(|i| colour[i]),
-            gamma,
-            sampling,
-        },
-    )
+    let colour = prop::collection::vec(-16.0..=16.0_f64, 9);
+    varied!(OutputDescription {
+        warp: texts(3),
+        surface: texts(3),
+        blend: texts(3),
+        blend_gamma: 0.1..=8.0_f64,
+        colour: colour.prop_map(|nine| std::array::from_fn(|i| nine[i])),
+        gamma: prop::array::uniform3(0.0..=8.0_f64),
+        sampling: 0.25..=4.0_f64,
+    })
 }
 
 fn any_body() -> impl Strategy<Value = BodyDescription> {
-    let colour = prop::array::uniform4(0.0..=1.0_f32);
-    let parts = (".{0,20}", any::<[u8; 32]>(), pose64(), colour);
-    parts.prop_map(|(name, bytes, pose, colour)| BodyDescription {
-        name: name.into(),
-        mesh: MeshHash { bytes },
-        pose,
-        colour,
+    varied!(BodyDescription {
+        name: text(".{0,20}"),
+        mesh: hash(),
+        pose: pose64(),
+        colour: prop::array::uniform4(0.0..=1.0_f32),
     })
 }
 
 fn any_screen() -> impl Strategy<Value = ScreenDescription> {
-    let corner = || prop::array::uniform3(finite64());
-    (".{0,20}", corner(), corner(), corner(), any_output()).prop_map(
-        |(name, lower_left, lower_right, upper_left, output)| ScreenDescription {
-            name: name.into(),
-            lower_left,
-            lower_right,
-            upper_left,
-            output,
-        },
-    )
+    varied!(ScreenDescription {
+        name: text(".{0,20}"),
+        lower_left: vector(),
+        lower_right: vector(),
+        upper_left: vector(),
+        output: any_output(),
+    })
 }
 
 fn any_node() -> impl Strategy<Value = NodeDescription> {
@@ -125,79 +128,46 @@ fn any_node() -> impl Strategy<Value = NodeDescription> {
         Stereo::Anaglyph,
         Stereo::TwoWindows,
     ]);
-    let window =
-        (0..=65_536_u32, 0..=65_536_u32, any::<bool>()).prop_map(|(width, height, fullscreen)| {
-            WindowDescription {
-                width,
-                height,
-                fullscreen,
-            }
-        });
-    let names = |most| prop::collection::vec(".{0,9}", 0..most);
-    (".{0,20}", names(4), stereo, window, names(3)).prop_map(
-        |(name, screens, stereo, window, monitors)| NodeDescription {
-            name: name.into(),
-            screens: screens.into_iter().map(Untrusted::from).collect(),
-            stereo,
-            window,
-            monitors: monitors.into_iter().map(Untrusted::from).collect(),
-        },
-    )
+    let window = varied!(WindowDescription {
+        width: 0..=65_536_u32,
+        height: 0..=65_536_u32,
+        fullscreen: any::<bool>(),
+    });
+    varied!(NodeDescription {
+        name: text(".{0,20}"),
+        screens: texts(4),
+        stereo,
+        window,
+        monitors: texts(3),
+    })
 }
 
 pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
-    let lists = (
-        prop::collection::vec(any_body(), 0..5),
-        prop::collection::vec(any_screen(), 0..4),
-        prop::collection::vec(any_node(), 0..4),
-    );
-    let numbers = (
-        prop::array::uniform6(1e-9..=1.0_f64),
-        prop::array::uniform3(finite64()),
-        any::<(u32, [bool; 5], Option<[u8; 32]>)>(),
-    );
-    (".{0,40}", any_body(), lists, (pose64(), pose64()), numbers).prop_map(
-        |(
-            name,
-            god_object,
-            (obstacles, screens, nodes),
-            (scene_origin, viewer),
-            (scalars, reference_point, (revision, shown, environment)),
-        )| {
-            let [
-                display_scale,
-                eye_separation,
-                near,
-                far,
-                separation_scale,
-                nearest_disparity,
-            ] = scalars;
-            let [ghost, contacts, force, hud, reflections] = shown;
-            SceneDescription {
-                name: name.into(),
-                revision,
-                god_object,
-                obstacles,
-                reference_point,
-                scene_origin,
-                display_scale,
-                screens,
-                nodes,
-                viewer,
-                eye_separation,
-                near,
-                far,
-                separation_scale,
-                nearest_disparity,
-                show: Show {
-                    ghost,
-                    contacts,
-                    force,
-                    hud,
-                    reflections,
-                },
-                environment: environment.map(|bytes| MeshHash { bytes }),
-            }
-        },
-    )
+    let scale = || 1e-9..=1.0_f64;
+    let show = varied!(Show {
+        ghost: any::<bool>(),
+        contacts: any::<bool>(),
+        force: any::<bool>(),
+        hud: any::<bool>(),
+        reflections: any::<bool>(),
+    });
+    varied!(SceneDescription {
+        name: text(".{0,40}"),
+        revision: any::<u32>(),
+        god_object: any_body(),
+        obstacles: prop::collection::vec(any_body(), 0..5),
+        reference_point: vector(),
+        scene_origin: pose64(),
+        display_scale: scale(),
+        screens: prop::collection::vec(any_screen(), 0..4),
+        nodes: prop::collection::vec(any_node(), 0..4),
+        viewer: pose64(),
+        eye_separation: scale(),
+        near: scale(),
+        far: scale(),
+        separation_scale: scale(),
+        nearest_disparity: scale(),
+        show,
+        environment: prop::option::of(hash()),
+    })
 }

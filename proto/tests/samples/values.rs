@@ -26,19 +26,17 @@ pub fn far() -> impl Strategy<Value = u64> {
 }
 
 pub fn pose32() -> impl Strategy<Value = PoseF32> {
-    (
-        prop::array::uniform3(finite32()),
-        prop::array::uniform4(-1.0..=1.0_f32),
-    )
-        .prop_map(|(position, rotation)| PoseF32 { position, rotation })
+    varied!(PoseF32 {
+        position: prop::array::uniform3(finite32()),
+        rotation: prop::array::uniform4(-1.0..=1.0_f32),
+    })
 }
 
 pub fn pose64() -> impl Strategy<Value = PoseF64> {
-    (
-        prop::array::uniform3(finite64()),
-        prop::array::uniform4(-1.0..=1.0_f64),
-    )
-        .prop_map(|(position, rotation)| PoseF64 { position, rotation })
+    varied!(PoseF64 {
+        position: prop::array::uniform3(finite64()),
+        rotation: prop::array::uniform4(-1.0..=1.0_f64),
+    })
 }
 
 pub fn list<T: std::fmt::Debug, const N: usize>(
