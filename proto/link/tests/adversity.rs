@@ -127,26 +127,6 @@ async fn a_bad_network_costs_states_but_never_order_or_truth() {
     wait_until("clock lock", || client.session_now().is_some()).await;
 }
 
-/// A client that dies without a word after `life`: its runtime goes first, so that nothing can be sent any more.
-fn murdered_client(options: taut_link::ClientOptions, life: Duration) {
-    let died = std::thread::Builder::new()
-        .name("victim".to_owned())
-        .spawn(move || {
-            let runtime = must(
-                tokio::runtime::Builder::new_multi_thread()
-                    .worker_threads(1)
-                    .enable_all()
-                    .build(),
-            );
-            let link = must(runtime.block_on(taut_link::connect(options)));
-            std::thread::sleep(life);
-            runtime.shutdown_background();
-            drop(link);
-        });
-    let died = must(died);
-    assert!(died.join().is_ok());
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_killed_client_disturbs_nobody_and_its_name_is_free_again() {
     let server = server_with(ServerOptions {
@@ -158,8 +138,7 @@ async fn a_killed_client_disturbs_nobody_and_its_name_is_free_again() {
     .await;
     let survivor = client(&server, Role::Render, "right").await;
     let tick = take_states(&server, &survivor, 1, 20).await;
-    let victim = options(&server, Role::Render, "left");
-    tokio::task::block_in_place(|| murdered_client(victim, Duration::from_millis(100)));
+    murder(options(&server, Role::Render, "left"));
 
     // The survivor goes on while the server finds out.
     let mut states = Vec::new();
@@ -200,36 +179,21 @@ async fn a_restarted_node_takes_the_place_of_its_silent_self() {
         idle_timeout: Duration::from_secs(60),
         ..options(&server, Role::Render, "left")
     };
-    let first = options.clone();
-    tokio::task::block_in_place(|| murdered_client(first, Duration::from_millis(200)));
+    murder(options.clone());
     tokio::time::sleep(Duration::from_millis(600)).await; // silent for longer than the server forgives
     let again = must(taut_link::connect(options).await);
     assert_eq!(server.clients().len(), 1);
     take_states(&server, &again, 1, 20).await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_dead_server_is_noticed() {
-    let runtime = must(
-        tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(1)
-            .enable_all()
-            .build(),
-    );
-    let (to_us, from_it) = tokio::sync::oneshot::channel();
-    let host = runtime.spawn(async move {
-        let server = server().await;
-        let options = options(&server, Role::Render, "left");
-        assert!(to_us.send(options).is_ok());
-        std::future::pending::<()>().await;
-        drop(server);
-    });
-    let options = from_it.await.expect("no server");
-    let client = must(taut_link::connect(options).await);
+#[test]
+fn a_dead_server_is_noticed() {
+    let server = Mortal::start(forgiving(), None);
+    let clients = runtime();
+    let client = clients.block_on(client(&server.link, Role::Render, "left"));
     // Its endpoint dies with its runtime and says nothing.
-    runtime.shutdown_background();
-    drop(host);
-    wait_until("noticing", || client.is_closed().is_some()).await;
+    server.die();
+    until("noticing", || client.is_closed().is_some());
     let reason = client.is_closed().unwrap_or_default();
     assert!(
         reason == "the server fell silent" || reason == "server is stopping",

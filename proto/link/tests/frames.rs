@@ -9,25 +9,20 @@ use std::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, AtomicU64, Ordering},
     },
-    thread::JoinHandle,
     time::{Duration, Instant},
 };
 use taut_link::{ClientLink, FrameTurn, Role, ServerLink, ServerOptions};
-use taut_proto::barrier::{MasterSettings, Swap};
+use taut_proto::barrier::Swap;
 use taut_test_kit::relay::{Impairment, Relay};
-
-/// Fast enough for many frames, slow enough for a busy machine.
-const PERIOD: Duration = Duration::from_millis(33);
 
 /// Which state each frame showed and when it was planned to be shown, by all nodes.
 type Shown = Arc<Mutex<HashMap<u64, Vec<(u64, u64)>>>>;
 
 /// A server that broadcasts and leads frames, in threads, until it is dropped.
 struct Leader {
+    _workers: Vec<Worker>,
     server: ServerLink,
     relay: Option<Relay>,
-    stop: Arc<AtomicBool>,
-    threads: Vec<JoinHandle<()>>,
 }
 
 impl Leader {
@@ -36,47 +31,16 @@ impl Leader {
         let server = server_with(ServerOptions {
             idle_timeout: FORGIVING,
             announced_udp_port: relayed.as_ref().map(|(port, _)| port.address().port()),
-            frames: swap.map(|swap| MasterSettings {
-                swap,
-                period_ns: PERIOD.as_nanos() as u64,
-                slowest_ns: 1_000_000_000,
-            }),
+            frames: swap.map(leading),
             ..ServerOptions::loopback(key('a'))
         })
         .await;
         let relay =
             relayed.map(|(port, impairment)| start_relay(port, server.udp_addr(), impairment, 7));
-        let stop = Arc::new(AtomicBool::new(false));
-        let mut threads = Vec::new();
-        let (mut broadcaster, clock, over) = (server.broadcaster(), server.clock(), stop.clone());
-        threads.push(thread("states", move || {
-            while !over.load(Ordering::SeqCst) {
-                let mut now = state(clock.now_ns() / 1_000_000 + 1);
-                now.sample_time_ns = clock.now_ns();
-                broadcaster.send(&now);
-                std::thread::sleep(Duration::from_millis(1));
-            }
-        }));
-        if let Some(mut master) = server.frame_master() {
-            let over = stop.clone();
-            threads.push(thread("frames", move || {
-                master.run(&|| over.load(Ordering::SeqCst));
-            }));
-        }
         Leader {
+            _workers: broadcasting(&server, |_| {}),
             server,
             relay,
-            stop,
-            threads,
-        }
-    }
-}
-
-impl Drop for Leader {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::SeqCst);
-        for thread in self.threads.drain(..) {
-            assert!(thread.join().is_ok() || std::thread::panicking());
         }
     }
 }
@@ -87,8 +51,7 @@ struct Screen {
     frames: Arc<AtomicU64>,
     free_turns: Arc<AtomicU64>,
     paused: Arc<AtomicBool>,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _worker: Worker,
 }
 
 impl Screen {
@@ -100,21 +63,17 @@ impl Screen {
         shown: &Shown,
     ) -> Screen {
         let link = Arc::new(client(&leader.server, role, name).await);
-        let mut screen = Screen {
-            link: link.clone(),
-            frames: Arc::default(),
-            free_turns: Arc::default(),
-            paused: Arc::default(),
-            stop: Arc::default(),
-            thread: None,
-        };
-        let (frames, free_turns) = (screen.frames.clone(), screen.free_turns.clone());
-        let (paused, stop, shown) = (screen.paused.clone(), screen.stop.clone(), shown.clone());
-        screen.thread = Some(thread(name, move || {
+        let frames = Arc::<AtomicU64>::default();
+        let free_turns = Arc::<AtomicU64>::default();
+        let paused = Arc::<AtomicBool>::default();
+        let own = (link.clone(), frames.clone(), free_turns.clone());
+        let (pauses, shown) = (paused.clone(), shown.clone());
+        let worker = Worker::start(name, move |is_over| {
+            let (link, frames, free_turns) = own;
             let mut gate = link.frame_gate(Duration::ZERO);
             let mut last = 0;
-            while !stop.load(Ordering::SeqCst) {
-                while paused.load(Ordering::SeqCst) && !stop.load(Ordering::SeqCst) {
+            while !is_over() {
+                while pauses.load(Ordering::SeqCst) && !is_over() {
                     std::thread::sleep(Duration::from_millis(1));
                 }
                 let FrameTurn::Draw(released) = gate.turn() else {
@@ -140,8 +99,14 @@ impl Screen {
                     frames.fetch_add(1, Ordering::SeqCst);
                 }
             }
-        }));
-        screen
+        });
+        Screen {
+            link,
+            frames,
+            free_turns,
+            paused,
+            _worker: worker,
+        }
     }
 
     fn frames(&self) -> u64 {
@@ -151,15 +116,6 @@ impl Screen {
     async fn show(&self, more: u64) {
         let enough = self.frames() + more;
         wait_until("frames", || self.frames() >= enough).await;
-    }
-}
-
-impl Drop for Screen {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::SeqCst);
-        if let Some(thread) = self.thread.take() {
-            assert!(thread.join().is_ok() || std::thread::panicking());
-        }
     }
 }
 

@@ -1,12 +1,8 @@
-//! The group over sockets: keys and roster reach the members, nodes speak to each other, and nothing under a group key commands anything.
+//! The group over sockets: keys and roster reach the members, and nothing under a group key commands anything. How nodes speak to each other: `succession.rs`.
 
 use crate::support::*;
-use std::{
-    net::UdpSocket,
-    sync::{Arc, Mutex, PoisonError},
-    time::Duration,
-};
-use taut_link::{ClientLink, ClientOptions, Role, Roster, Transport};
+use std::{net::UdpSocket, time::Duration};
+use taut_link::{ClientLink, Role, Roster, Transport};
 use taut_proto::{
     Group, GroupSealer, Header, Kind, PROTOCOL_VERSION, Payload,
     group::{FLAG_GROUP, GroupSecret},
@@ -69,13 +65,7 @@ async fn the_same_group_stays_while_only_addresses_become_known() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_member_over_quic_has_no_address_and_is_told_all_the_same() {
     let server = server().await;
-    let far = must(
-        taut_link::connect(ClientOptions {
-            transport: Transport::QuicDatagram,
-            ..options(&server, Role::Observer, "far")
-        })
-        .await,
-    );
+    let far = node_over(Transport::QuicDatagram, &server, "far").await;
     wait_until("the roster", || far.roster().is_some()).await;
     let left = client(&server, Role::Render, "left").await;
     wait_until("both", || {
@@ -92,63 +82,6 @@ async fn a_member_over_quic_has_no_address_and_is_told_all_the_same() {
         !far.send_to_member(left.session(), &Payload::Heartbeat),
         "over UDP only"
     );
-}
-
-/// What a client got from the group.
-#[derive(Clone, Default)]
-struct Heard(Arc<Mutex<Vec<(u16, Payload)>>>);
-
-impl Heard {
-    fn by(client: &ClientLink) -> Heard {
-        let heard = Heard::default();
-        let of_client = heard.clone();
-        let set = client.on_group_datagram(Box::new(move |sender, payload, _| {
-            of_client.list().push((sender, payload.clone()));
-        }));
-        assert!(set);
-        heard
-    }
-
-    fn list(&self) -> std::sync::MutexGuard<'_, Vec<(u16, Payload)>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn nodes_speak_to_each_other_without_the_server() {
-    let server = server().await;
-    let left = client(&server, Role::Render, "left").await;
-    let right = client(&server, Role::Render, "right").await;
-    let (at_left, at_right) = (Heard::by(&left), Heard::by(&right));
-    assert!(
-        !left.on_group_datagram(Box::new(|_, _, _| {})),
-        "one receiver"
-    );
-    agree(&[&left, &right], &["left", "right"]).await;
-
-    // The one that came first still speaks under the generation before for a moment, which the newcomer does not know.
-    wait_until("hearing", || {
-        assert!(left.send_to_member(right.session(), &Payload::Heartbeat));
-        assert!(right.send_to_member(left.session(), &Payload::Heartbeat));
-        at_right.list().len() >= 3 && at_left.list().len() >= 3
-    })
-    .await;
-    assert_eq!(at_left.list()[0], (right.session(), Payload::Heartbeat));
-    assert!(
-        at_right
-            .list()
-            .iter()
-            .all(|heard| *heard == (left.session(), Payload::Heartbeat))
-    );
-    // What a group key may not carry does not leave, and nobody is at other numbers.
-    assert!(!left.send_to_member(right.session(), &Payload::Input(input(1))));
-    assert!(!left.send_to_member(right.session(), &Payload::Hot(state(1))));
-    assert!(!left.send_to_member(9999, &Payload::Heartbeat));
-
-    // With the keys of the group that left, nobody is heard any more.
-    let generation = left.roster().map_or(0, |roster| roster.generation);
-    right.close().await;
-    assert!(agree(&[&left], &["left"]).await > generation);
 }
 
 /// A member that turned bad has the secret, and seals and sends whatever it likes.

@@ -4,16 +4,15 @@ use crate::support::*;
 use ring::digest::{SHA256, digest};
 use std::{
     net::{SocketAddr, UdpSocket},
-    sync::Arc,
     time::{Duration, Instant},
 };
 use taut_link::{
     ClientOptions, Credential, FloodLimits, Holder, LinkError, Role, ServerLink, ServerOptions,
-    ServerPin, binding, pinning::PinnedServer, transport,
+    ServerPin, binding,
 };
 use taut_proto::{
-    Header, Kind, PROTOCOL_VERSION, VersionRange,
-    control::{ControlMessage, Hello, LENGTH_BYTES, Offers, RefusalCode, Transport},
+    Header, Kind, PROTOCOL_VERSION,
+    control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode},
     header::{HEADER_BYTES, TAG_BYTES},
     limits::{JoinLimits, Rate},
     proof::{Claim, Grant},
@@ -37,22 +36,7 @@ impl Middle {
         .subject_public_key_info();
         let private =
             rustls::pki_types::PrivatePkcs8KeyDer::from(identity.signing_key.serialize_der());
-        let mut tls = must(
-            must(
-                rustls::ServerConfig::builder_with_provider(Arc::new(
-                    rustls::crypto::ring::default_provider(),
-                ))
-                .with_protocol_versions(&[&rustls::version::TLS13]),
-            )
-            .with_no_client_auth()
-            .with_single_cert(vec![identity.cert.der().clone()], private.into()),
-        );
-        tls.alpn_protocols = vec![b"taut".to_vec()];
-        let crypto = must(quinn::crypto::rustls::QuicServerConfig::try_from(tls));
-        let endpoint = must(quinn::Endpoint::server(
-            quinn::ServerConfig::with_crypto(Arc::new(crypto)),
-            SocketAddr::from(([127, 0, 0, 1], 0)),
-        ));
+        let endpoint = raw_server(identity.cert.der().clone(), private);
         let address = must(endpoint.local_addr());
         let (hears, heard) = mpsc::unbounded_channel();
         let (real, pin) = (server.quic_addr(), server.pin());
@@ -71,21 +55,13 @@ impl Middle {
     }
 }
 
-async fn connection(server: SocketAddr, pin: ServerPin) -> quinn::Connection {
-    let pinned = Arc::new(PinnedServer::new(pin));
-    let config = must(transport::client_config(pinned, Duration::from_secs(5)));
-    let any = SocketAddr::from(([127, 0, 0, 1], 0));
-    let endpoint = must(quinn::Endpoint::client(any));
-    must(must(endpoint.connect_with(config, server, "taut")).await)
-}
-
 async fn relay(
     victim: quinn::Connection,
     real: SocketAddr,
     pin: ServerPin,
     hears: mpsc::UnboundedSender<Vec<u8>>,
 ) -> Option<()> {
-    let onward = connection(real, pin).await;
+    let onward = raw_connection(real, raw_config(pin)).await;
     let (mut to_victim, mut from_victim) = victim.accept_bi().await.ok()?;
     let (mut to_server, mut from_server) = onward.open_bi().await.ok()?;
     let up = async {
@@ -168,9 +144,7 @@ async fn a_proof_that_is_passed_on_is_refused_by_the_server() {
 
 /// Says `hello` on a connection of its own; what the server answers.
 async fn answer(connection: &quinn::Connection, hello: Hello) -> ControlMessage {
-    let frame = must(ControlMessage::Hello(hello).to_frame());
-    let (mut send, mut recv) = must(connection.open_bi().await);
-    must(send.write_all(&frame).await);
+    let (_send, mut recv) = say(connection, &frame(&ControlMessage::Hello(hello))).await;
     let mut length = [0; LENGTH_BYTES];
     must(recv.read_exact(&mut length).await);
     let mut body = vec![0; u32::from_le_bytes(length) as usize];
@@ -183,19 +157,6 @@ fn claim() -> Claim<'static> {
         role: Role::Render,
         node: "left",
         grant: Grant::Node { issue: 1 },
-    }
-}
-
-fn hello(claim: Claim<'_>, proof: [u8; 32]) -> Hello {
-    Hello {
-        versions: VersionRange::SUPPORTED,
-        node: claim.node.into(),
-        role: claim.role,
-        transport: Transport::Udp,
-        rate_hz: 0,
-        proof,
-        grant: claim.grant,
-        offers: Offers::NONE,
     }
 }
 
@@ -216,39 +177,23 @@ async fn a_proof_counts_on_its_own_connection_and_for_its_own_claim_only() {
     }))
     .await;
     let secret = key('a').join_secret(claim().role, claim().node, claim().grant);
-    let open = || connection(server.quic_addr(), server.pin());
+    let open = || raw_connection(server.quic_addr(), raw_config(server.pin()));
 
     let (one, other) = (open().await, open().await);
     let proof = secret.client_proof(&must(binding::proof_binding(&one)), claim());
     assert_wrong_key(&answer(&other, hello(claim(), proof)).await, "elsewhere");
 
     // The stolen secret of one credential, for everything that it is not.
-    for wrong in [
-        Claim {
-            role: Role::Device,
-            ..claim()
-        },
-        Claim {
-            role: Role::Operator,
-            ..claim()
-        },
-        Claim {
-            node: "right",
-            ..claim()
-        },
-        Claim {
-            grant: Grant::Master,
-            ..claim()
-        },
-        Claim {
-            grant: Grant::Node { issue: 2 },
-            ..claim()
-        },
-        Claim {
-            grant: Grant::AnyNode { issue: 1 },
-            ..claim()
-        },
+    let (role, node, grant) = (claim().role, claim().node, claim().grant);
+    for (role, node, grant) in [
+        (Role::Device, node, grant),
+        (Role::Operator, node, grant),
+        (role, "right", grant),
+        (role, node, Grant::Master),
+        (role, node, Grant::Node { issue: 2 }),
+        (role, node, Grant::AnyNode { issue: 1 }),
     ] {
+        let wrong = Claim { role, node, grant };
         let connection = open().await;
         let exporter = must(binding::proof_binding(&connection));
         let proof = secret.client_proof(&exporter, wrong);
@@ -292,13 +237,8 @@ async fn a_credential_does_not_make_a_server() {
 async fn guesses_are_slowed_down_and_who_holds_the_key_gets_in_all_the_same() {
     let server = server().await;
     let open = || async {
-        let pinned = Arc::new(PinnedServer::new(server.pin()));
-        let config = must(transport::client_config(pinned, Duration::from_secs(5)));
-        let endpoint = must(quinn::Endpoint::client(SocketAddr::from((
-            [127, 0, 0, 1],
-            0,
-        ))));
-        must(endpoint.connect_with(config, server.quic_addr(), "taut")).await
+        let endpoint = raw_endpoint(raw_config(server.pin()));
+        must(endpoint.connect(server.quic_addr(), "taut")).await
     };
     let mut answered = 0;
     while server.counters().turned_away == 0 {
@@ -331,11 +271,8 @@ async fn many_attempts_at_once_must_prove_their_address_and_are_bounded() {
         .map(|_| {
             let (address, pin) = (server.quic_addr(), server.pin());
             tokio::spawn(async move {
-                let pinned = Arc::new(PinnedServer::new(pin));
-                let config = must(transport::client_config(pinned, Duration::from_secs(5)));
-                let any = SocketAddr::from(([127, 0, 0, 1], 0));
-                let endpoint = must(quinn::Endpoint::client(any));
-                let connection = must(endpoint.connect_with(config, address, "taut")).await;
+                let endpoint = raw_endpoint(raw_config(pin));
+                let connection = must(endpoint.connect(address, "taut")).await;
                 tokio::time::sleep(PATIENCE).await;
                 drop(connection);
             })
@@ -353,13 +290,10 @@ async fn many_attempts_at_once_must_prove_their_address_and_are_bounded() {
 
 /// The first packet of an attempt to join `server`, kept from it.
 fn first_packet(server: &ServerLink) -> Vec<u8> {
-    let local = SocketAddr::from(([127, 0, 0, 1], 0));
-    let heard = must(UdpSocket::bind(local));
+    let heard = must(UdpSocket::bind(ANY));
     must(heard.set_read_timeout(Some(PATIENCE)));
-    let pinned = Arc::new(PinnedServer::new(server.pin()));
-    let config = must(transport::client_config(pinned, Duration::from_secs(5)));
-    let endpoint = must(quinn::Endpoint::client(local));
-    let joining = must(endpoint.connect_with(config, must(heard.local_addr()), "taut"));
+    let endpoint = raw_endpoint(raw_config(server.pin()));
+    let joining = must(endpoint.connect(must(heard.local_addr()), "taut"));
     let mut packet = vec![0; 2048];
     let length = must(heard.recv(&mut packet));
     packet.truncate(length);
@@ -379,7 +313,7 @@ async fn first_packets_under_a_node_s_address_do_not_keep_it_out() {
         ..JoinLimits::default()
     }))
     .await;
-    let forger = must(UdpSocket::bind(SocketAddr::from(([127, 0, 0, 1], 0))));
+    let forger = must(UdpSocket::bind(ANY));
     for _ in 0..PACKETS {
         must(forger.send_to(&first_packet(&server), server.quic_addr()));
     }
@@ -444,7 +378,7 @@ async fn forged_datagrams_of_an_unknown_source_are_opened_at_its_rate_only() {
     let mut forged = header.to_bytes().to_vec();
     forged.resize(HEADER_BYTES + 32 + TAG_BYTES, 0x5a);
     let start = Instant::now();
-    let socket = must(std::net::UdpSocket::bind("127.0.0.1:0"));
+    let socket = must(UdpSocket::bind(ANY));
     // However many the full buffer of the socket did not take.
     wait_until("many of them", || {
         for _ in 0..20 {

@@ -3,7 +3,6 @@
 use crate::support::*;
 use std::{
     fs,
-    net::SocketAddr,
     sync::{
         Arc,
         atomic::{AtomicU32, Ordering},
@@ -15,70 +14,18 @@ use taut_link::{
     Role, ServerLink, ServerOptions, SessionEnd, SupervisedLink, connect, serve,
 };
 use taut_proto::{ClientStats, MeshBlob, mesh_blob::Positions};
-use tokio::runtime::Runtime;
-
-/// A server with a runtime of its own, so that it can die without a word and come back at the same place.
-struct Mortal {
-    runtime: Runtime,
-    link: ServerLink,
-    addresses: (SocketAddr, SocketAddr),
-}
-
-impl Mortal {
-    fn start(content: Content, addresses: Option<(SocketAddr, SocketAddr)>) -> Mortal {
-        let runtime = runtime();
-        let (quic, udp) = addresses.unwrap_or_else(|| {
-            let any = SocketAddr::from(([127, 0, 0, 1], 0));
-            (any, any)
-        });
-        let options = ServerOptions {
-            quic,
-            udp,
-            ..forgiving()
-        };
-        let link = must(runtime.block_on(serve(options, content)));
-        let addresses = (link.quic_addr(), link.udp_addr());
-        Mortal {
-            runtime,
-            link,
-            addresses,
-        }
-    }
-
-    /// Its endpoint is gone before it could say anything.
-    fn die(self) -> (SocketAddr, SocketAddr) {
-        self.runtime.shutdown_timeout(PATIENCE);
-        drop(self.link);
-        // The receiving thread ends within one wait, and frees its port.
-        let free = || std::net::UdpSocket::bind(self.addresses.1).is_ok();
-        let start = Instant::now();
-        while !free() {
-            assert!(start.elapsed() < PATIENCE, "the port stays taken");
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        self.addresses
-    }
-}
-
 fn joining(server: &ServerLink, node: &str) -> ClientOptions {
     options(server, Role::Render, node)
 }
 
 /// Asks until there is something new.
 fn renewal<T: Send + 'static>(link: &SupervisedLink<T>) -> Renewal<T> {
-    let start = Instant::now();
-    loop {
-        if let Some(renewal) = link.take_renewal() {
-            return renewal;
-        }
-        assert!(start.elapsed() < PATIENCE, "nothing new came");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    until_some("something new", || link.take_renewal())
 }
 
 #[test]
 fn a_link_whose_server_dies_is_lost_and_comes_back_to_the_next_server_with_a_new_epoch() {
-    let server = Mortal::start(content(), None);
+    let server = Mortal::start(forgiving(), None);
     let clients = runtime();
     let made = Arc::new(AtomicU32::new(0));
     let counted = made.clone();
@@ -108,7 +55,7 @@ fn a_link_whose_server_dies_is_lost_and_comes_back_to_the_next_server_with_a_new
         "the clock of the lost session goes on: the age of its last state can be told"
     );
 
-    let server = Mortal::start(content(), Some(addresses));
+    let server = Mortal::start(forgiving(), Some(addresses));
     let Renewal::Session { link, prepared } = renewal(&supervised) else {
         panic!("a new session");
     };
@@ -122,18 +69,13 @@ fn a_link_whose_server_dies_is_lost_and_comes_back_to_the_next_server_with_a_new
     );
     clients.block_on(wait_until("the clock", || link.session_now().is_some()));
     assert_eq!(supervised.health(), LinkHealth::Connected);
-    let mut seen = Vec::new();
-    clients.block_on(broadcast_until(&mut server.link.broadcaster(), 1, || {
-        link.drain_states(&mut seen);
-        seen.len() > 10
-    }));
-    assert_in_order(&seen);
+    clients.block_on(take_states(&server.link, &link, 1, 11));
     assert_eq!(made.load(Ordering::Relaxed), 2);
 }
 
 #[test]
 fn datagrams_of_an_old_epoch_are_refused() {
-    let server = Mortal::start(content(), None);
+    let server = Mortal::start(forgiving(), None);
     let clients = runtime();
     // It will not notice the death of its server, and goes on sending to the next one at the same port.
     let old = ClientOptions {
@@ -142,7 +84,7 @@ fn datagrams_of_an_old_epoch_are_refused() {
     };
     let old = must(clients.block_on(connect(old)));
     let addresses = server.die();
-    let server = Mortal::start(content(), Some(addresses));
+    let server = Mortal::start(forgiving(), Some(addresses));
     let new = must(clients.block_on(connect(options(&server.link, Role::Device, "bridge"))));
     assert_eq!(
         old.session(),
@@ -170,15 +112,12 @@ fn datagrams_of_an_old_epoch_are_refused() {
 fn a_server_that_stops_ends_the_link_unless_it_is_to_stay() {
     let clients = runtime();
     for stay in [false, true] {
-        let server = Mortal::start(content(), None);
+        let server = Mortal::start(forgiving(), None);
         let policy = RejoinPolicy {
             stay,
             ..RejoinPolicy::default()
         };
-        let joined = SupervisedLink::join(joining(&server.link, "left"), policy, |_| async {
-            Ok::<(), LinkError>(())
-        });
-        let (supervised, _first, ()) = must(clients.block_on(joined));
+        let (supervised, _first) = supervised(&clients, joining(&server.link, "left"), policy);
         let Mortal {
             runtime,
             link,
@@ -186,7 +125,7 @@ fn a_server_that_stops_ends_the_link_unless_it_is_to_stay() {
         } = server;
         runtime.block_on(link.shutdown());
         if stay {
-            let _again = Mortal::start(content(), Some(addresses));
+            let _again = Mortal::start(forgiving(), Some(addresses));
             assert!(matches!(renewal(&supervised), Renewal::Session { .. }));
         } else {
             let Renewal::Ended(end) = renewal(&supervised) else {
@@ -199,16 +138,13 @@ fn a_server_that_stops_ends_the_link_unless_it_is_to_stay() {
 
 #[test]
 fn a_limit_that_was_named_ends_a_lost_link_and_a_failed_preparation_does_not() {
-    let server = Mortal::start(content(), None);
+    let server = Mortal::start(forgiving(), None);
     let clients = runtime();
     let policy = RejoinPolicy {
         give_up: Some(Duration::from_millis(800)),
         ..RejoinPolicy::default()
     };
-    let joined = SupervisedLink::join(joining(&server.link, "left"), policy, |_| async {
-        Ok::<(), LinkError>(())
-    });
-    let (supervised, _first, ()) = must(clients.block_on(joined));
+    let (supervised, _first) = supervised(&clients, joining(&server.link, "left"), policy);
     let dead = Instant::now();
     let addresses = server.die();
     assert!(matches!(
@@ -218,7 +154,7 @@ fn a_limit_that_was_named_ends_a_lost_link_and_a_failed_preparation_does_not() {
     assert!(dead.elapsed() >= Duration::from_millis(800));
 
     // The second session cannot be made ready; the third can.
-    let server = Mortal::start(content(), Some(addresses));
+    let server = Mortal::start(forgiving(), Some(addresses));
     let tries = AtomicU32::new(0);
     let prepare = move |_| {
         let number = tries.fetch_add(1, Ordering::Relaxed);
@@ -246,15 +182,6 @@ fn a_limit_that_was_named_ends_a_lost_link_and_a_failed_preparation_does_not() {
     assert_eq!(prepared, 2);
 }
 
-/// A client that dies without a word: its runtime goes first, so that nothing can be sent any more.
-fn murder(options: ClientOptions) {
-    let runtime = runtime();
-    let link = must(runtime.block_on(connect(options)));
-    runtime.block_on(wait_until("being heard", || link.session_now().is_some()));
-    runtime.shutdown_background();
-    drop(link);
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_silent_node_is_told_evicted_and_its_name_is_free_and_who_only_watches_is_left_in_peace()
 {
@@ -269,7 +196,7 @@ async fn a_silent_node_is_told_evicted_and_its_name_is_free_and_who_only_watches
             idle_timeout: Duration::from_secs(60),
             ..options(&server, role, node)
         };
-        tokio::task::block_in_place(|| murder(options));
+        murder(options);
     }
     let died = Instant::now();
     event(
@@ -361,12 +288,7 @@ async fn a_late_node_gets_a_large_mesh_at_a_pace_that_leaves_the_others_their_st
     assert!(bytes > 10_000_000);
     let server = must(serve(forgiving(), content).await);
     let early = client(&server, Role::Render, "left").await;
-    let mut seen = Vec::new();
-    let tick = broadcast_until(&mut server.broadcaster(), 1, || {
-        early.drain_states(&mut seen);
-        seen.len() >= 50
-    })
-    .await;
+    let tick = take_states(&server, &early, 1, 50).await;
 
     let late_options = joining(&server, "late");
     let began = Instant::now();
@@ -378,7 +300,7 @@ async fn a_late_node_gets_a_large_mesh_at_a_pace_that_leaves_the_others_their_st
         // What was sent meanwhile has been queued: the newest quarter of a second of it.
         (drain(&late).len(), took)
     });
-    seen.clear();
+    let mut seen = Vec::new();
     broadcast_in_step_until(
         &mut server.broadcaster(),
         tick,

@@ -2,8 +2,6 @@
 //!
 //! Where the system gives no multicast on loopback, the tests of it say so and end.
 
-use crate::support;
-
 use crate::support::*;
 use std::{
     net::{Ipv4Addr, SocketAddrV4, UdpSocket},
@@ -11,7 +9,6 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
-    thread::JoinHandle,
     time::{Duration, Instant},
 };
 use taut_link::{ClientOptions, MulticastOptions, Role, ServerLink, ServerOptions, Transport};
@@ -59,8 +56,7 @@ fn multicast_works() -> bool {
 /// Stands between the server's group and that of the clients, as a switch does, and passes datagrams while it is open.
 struct Switch {
     open: Arc<AtomicBool>,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _worker: Worker,
 }
 
 impl Switch {
@@ -74,38 +70,21 @@ impl Switch {
             Ok((listener, sender))
         };
         let (listener, sender) = must(listen());
-        let (open, stop) = (
-            Arc::new(AtomicBool::new(open)),
-            Arc::new(AtomicBool::new(false)),
-        );
-        let (is_open, stops) = (open.clone(), stop.clone());
-        let thread = must(
-            std::thread::Builder::new()
-                .name("switch".to_owned())
-                .spawn(move || {
-                    let mut buffer = [0; 2048];
-                    while !stops.load(Ordering::SeqCst) {
-                        if let Ok(length) = listener.recv(&mut buffer)
-                            && is_open.load(Ordering::SeqCst)
-                        {
-                            let _ = sender.send_to(&buffer[..length], &clients.into());
-                        }
-                    }
-                }),
-        );
+        let open = Arc::new(AtomicBool::new(open));
+        let is_open = open.clone();
+        let worker = Worker::start("switch", move |is_over| {
+            let mut buffer = [0; 2048];
+            while !is_over() {
+                if let Ok(length) = listener.recv(&mut buffer)
+                    && is_open.load(Ordering::SeqCst)
+                {
+                    let _ = sender.send_to(&buffer[..length], &clients.into());
+                }
+            }
+        });
         Switch {
             open,
-            stop,
-            thread: Some(thread),
-        }
-    }
-}
-
-impl Drop for Switch {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::SeqCst);
-        if let Some(thread) = self.thread.take() {
-            assert!(thread.join().is_ok() || std::thread::panicking());
+            _worker: worker,
         }
     }
 }
@@ -144,26 +123,17 @@ async fn one_datagram_serves_all_who_hear_the_group() {
     if !multicast_works() {
         return;
     }
-    let (_, options) = options_with_group();
-    let server = server_with(options).await;
+    let server = server_with(options_with_group().1).await;
     let left = client(&server, Role::Render, "left").await;
     let right = client(&server, Role::Observer, "right").await;
     // These do not listen: a device bridge, QUIC, and who wants few states.
     let bridge = client(&server, Role::Device, "bridge").await;
-    let far = must(
-        taut_link::connect(ClientOptions {
-            transport: Transport::QuicDatagram,
-            ..support::options(&server, Role::Render, "far")
-        })
-        .await,
-    );
-    let rare = must(
-        taut_link::connect(ClientOptions {
-            rate_hz: 100,
-            ..support::options(&server, Role::Observer, "rare")
-        })
-        .await,
-    );
+    let far = node_over(Transport::QuicDatagram, &server, "far").await;
+    let rare = join(ClientOptions {
+        rate_hz: 100,
+        ..options(&server, Role::Observer, "rare")
+    })
+    .await;
 
     let mut tick = 1;
     let start = Instant::now();
@@ -298,24 +268,20 @@ async fn a_full_way_lowers_the_rate_and_the_full_rate_comes_back() {
         ..options(&server, Role::Render, "slow")
     };
     let (go_on, stands_still) = std::sync::mpsc::channel::<()>();
-    let thread = must(
-        std::thread::Builder::new()
-            .name("slow".to_owned())
-            .spawn(move || {
-                let runtime = must(
-                    tokio::runtime::Builder::new_current_thread()
-                        .enable_all()
-                        .build(),
-                );
-                runtime.block_on(async {
-                    let link = must(taut_link::connect(options).await);
-                    // Nothing of this runtime moves until the word comes.
-                    assert!(stands_still.recv().is_ok());
-                    let reason = link.closed().await;
-                    assert_eq!(reason, taut_link::STOP_REASON);
-                });
-            }),
-    );
+    let slow = Worker::start("slow", move |_| {
+        let runtime = must(
+            tokio::runtime::Builder::new_current_thread()
+                .enable_all()
+                .build(),
+        );
+        runtime.block_on(async {
+            let link = join(options).await;
+            // Nothing of this runtime moves until the word comes.
+            assert!(stands_still.recv().is_ok());
+            let reason = link.closed().await;
+            assert_eq!(reason, taut_link::STOP_REASON);
+        });
+    });
 
     let mut broadcaster = server.broadcaster();
     let lowered = || server.clients().iter().any(|client| client.lowered_rate);
@@ -339,6 +305,5 @@ async fn a_full_way_lowers_the_rate_and_the_full_rate_comes_back() {
     let report = broadcaster.send(&state(tick));
     assert_eq!((report.sent, report.skipped), (1, 0));
     server.shutdown().await;
-    let ended = tokio::task::spawn_blocking(move || thread.join()).await;
-    assert!(matches!(ended, Ok(Ok(()))));
+    tokio::task::block_in_place(|| drop(slow));
 }

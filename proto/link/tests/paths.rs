@@ -16,16 +16,20 @@ async fn behind_a_door() -> (UdpSocket, ServerLink) {
     (door, server_with(options).await)
 }
 
+/// A port that is read without waiting.
+fn a_port(address: &str) -> UdpSocket {
+    let socket = must(UdpSocket::bind(address));
+    must(socket.set_nonblocking(true));
+    socket
+}
+
 /// Holds what a client sends, sends it on from elsewhere, and looks what comes there.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_datagram_that_is_sent_on_from_elsewhere_turns_no_stream_there() {
     let (door, server) = behind_a_door().await;
     let client = client(&server, Role::Render, "left").await;
-    let own = UdpSocket::bind("127.0.0.1:0").expect("a port");
-    let elsewhere = UdpSocket::bind("127.0.0.2:0").expect("another address of this machine");
-    for socket in [&own, &elsewhere] {
-        socket.set_nonblocking(true).expect("set");
-    }
+    let own = a_port("127.0.0.1:0");
+    let elsewhere = a_port("127.0.0.2:0");
     let mut broadcaster = server.broadcaster();
     let (mut tick, mut turned, mut bytes_elsewhere, mut states) = (0, false, 0, Vec::new());
     let mut buffer = [0; 2048];
@@ -83,13 +87,7 @@ async fn a_client_whose_address_changes_is_followed_as_soon_as_it_has_answered()
     let (door, server) = behind_a_door().await;
     let client = client(&server, Role::Render, "left").await;
     // A router that hands out another port in the middle of it.
-    let ports = [
-        UdpSocket::bind("127.0.0.1:0").expect("a port"),
-        UdpSocket::bind("127.0.0.1:0").expect("a port"),
-    ];
-    for port in &ports {
-        port.set_nonblocking(true).expect("set");
-    }
+    let ports = ["127.0.0.1:0"; 2].map(a_port);
     let mut buffer = [0; 2048];
     let (mut present, mut of_client) = (0, None);
     let end = Instant::now() + PATIENCE;
@@ -119,19 +117,11 @@ async fn a_client_whose_address_changes_is_followed_as_soon_as_it_has_answered()
 #[cfg(target_os = "linux")]
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn what_the_device_sends_comes_by_its_own_socket_and_nobody_else_s_does() {
-    use std::sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    };
     let server = server().await;
     let bridge = client(&server, Role::Device, "bridge").await;
     wait_until("its path", || server.clients()[0].udp_address.is_some()).await;
-    let over = Arc::new(AtomicBool::new(false));
-    let (mut receiver, of_thread) = (server.device_receiver(), over.clone());
-    let reading = std::thread::Builder::new()
-        .name("device-input".to_owned())
-        .spawn(move || receiver.run(&|| of_thread.load(Ordering::Relaxed)))
-        .expect("a thread");
+    let mut receiver = server.device_receiver();
+    let reading = Worker::start("device-input", move |is_over| receiver.run(is_over));
     // Two sockets of one port: the second is connected to the bridge.
     let port = format!(":{:04X}", server.udp_addr().port());
     let connected = || {
@@ -162,6 +152,5 @@ async fn what_the_device_sends_comes_by_its_own_socket_and_nobody_else_s_does() 
     // When the bridge is gone, so is its socket.
     bridge.close().await;
     wait_until("the end of its socket", || connected() == 0).await;
-    over.store(true, Ordering::Relaxed);
-    reading.join().expect("no panic");
+    drop(reading);
 }

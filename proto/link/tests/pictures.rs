@@ -1,17 +1,16 @@
 //! Pictures of what nodes show: who is asked, what comes, and what is refused of those who answer as they like.
 
-use crate::support::{FORGIVING, PATIENCE, key, must, options, server_with};
-use std::{
-    net::SocketAddr,
-    sync::Arc,
-    time::{Duration, Instant},
+use crate::support::{
+    FORGIVING, PATIENCE, frame, join, key, must, options, proved_hello, raw_config, raw_connection,
+    say, server_with, wait_for,
 };
+use std::time::{Duration, Instant};
 use taut_link::{
     ClientLink, ClientOptions, NodePicture, PICTURE_PATIENCE, PictureAnswer, Role, ServerLink,
-    ServerOptions, ShownPicture, Transport, binding, pinning::PinnedServer, transport,
+    ServerOptions, ShownPicture,
 };
 use taut_proto::{
-    ControlMessage, PROTOCOL_VERSION, VersionRange,
+    ControlMessage, PROTOCOL_VERSION,
     control::{Hello, LENGTH_BYTES, NoPicture, Offers, PictureHeader},
     picture::{MAX_PICTURE_BYTES, MAX_PICTURE_EDGE},
     proof::{Claim, Grant},
@@ -38,13 +37,11 @@ async fn asked(server: &ServerLink) -> Vec<PictureAnswer> {
 }
 
 async fn node(server: &ServerLink, name: &str, pictures: bool) -> ClientLink {
-    must(
-        taut_link::connect(ClientOptions {
-            pictures,
-            ..options(server, Role::Render, name)
-        })
-        .await,
-    )
+    join(ClientOptions {
+        pictures,
+        ..options(server, Role::Render, name)
+    })
+    .await
 }
 
 fn shown(screen: &str, bytes: usize) -> ShownPicture {
@@ -58,14 +55,7 @@ fn shown(screen: &str, bytes: usize) -> ShownPicture {
 
 /// Answers the next question as a frame loop does.
 async fn answer_next(link: &ClientLink, shown: taut_link::Shown) {
-    let begun = Instant::now();
-    let ask = loop {
-        if let Some(ask) = link.take_picture_ask() {
-            break ask;
-        }
-        assert!(begun.elapsed() < PATIENCE, "nobody asks");
-        sleep(Duration::from_millis(2)).await;
-    };
+    let ask = wait_for("a question", || link.take_picture_ask()).await;
     assert_eq!(ask.longest_edge(), MAX_PICTURE_EDGE);
     ask.answer(shown);
 }
@@ -85,7 +75,7 @@ async fn nodes_answer_with_all_their_pictures_and_an_older_one_is_named() {
         node(&server, "table", true).await,
     );
     let _old = node(&server, "wall", false).await;
-    let _watcher = must(taut_link::connect(options(&server, Role::Observer, "watcher")).await);
+    let _watcher = join(options(&server, Role::Observer, "watcher")).await;
     let pictures = vec![shown("left-left", 300_000), shown("left-right", 1)];
     let (answers, (), ()) = tokio::join!(
         asked(&server),
@@ -124,49 +114,31 @@ async fn a_node_does_not_send_what_the_server_would_refuse() {
     let (answers, ()) = tokio::join!(asked(&server), answer_next(&front, Ok(many)));
     assert!(why(&answers[0]).contains("17 pictures"), "{answers:?}");
     let (answers, ()) = tokio::join!(asked(&server), async {
-        let begun = Instant::now();
-        while front.take_picture_ask().is_none() {
-            assert!(begun.elapsed() < PATIENCE, "nobody asks");
-            sleep(Duration::from_millis(2)).await;
-        }
+        drop(wait_for("a question", || front.take_picture_ask()).await);
     });
     assert!(why(&answers[0]).contains("busy"), "dropped: {answers:?}");
 }
 
-/// A node that is in and answers as it likes: its connection, and what keeps it.
-async fn stranger(server: &ServerLink, name: &str) -> (quinn::Connection, quinn::Endpoint) {
-    let pinned = Arc::new(PinnedServer::new(server.pin()));
-    let config = must(transport::client_config(pinned, FORGIVING));
-    let any = SocketAddr::from(([127, 0, 0, 1], 0));
-    let endpoint = must(quinn::Endpoint::client(any));
-    let connecting = must(endpoint.connect_with(config, server.quic_addr(), "taut"));
-    let connection = must(connecting.await);
+/// A node that is in and answers as it likes.
+async fn stranger(server: &ServerLink, name: &str) -> quinn::Connection {
+    let connection = raw_connection(server.quic_addr(), raw_config(server.pin())).await;
     let claim = Claim {
         role: Role::Render,
         node: name,
         grant: Grant::Master,
     };
-    let bound = must(binding::proof_binding(&connection));
-    let secret = key('a').join_secret(claim.role, claim.node, claim.grant);
-    let hello = ControlMessage::Hello(Hello {
-        versions: VersionRange::SUPPORTED,
-        node: name.into(),
-        role: claim.role,
-        transport: Transport::Udp,
-        rate_hz: 0,
-        proof: secret.client_proof(&bound, claim),
-        grant: claim.grant,
+    let hello = Hello {
         offers: Offers::PICTURES,
-    });
-    let (mut send, mut recv) = must(connection.open_bi().await);
-    must(send.write_all(&must(hello.to_frame())).await);
+        ..proved_hello(&connection, claim)
+    };
+    let (send, mut recv) = say(&connection, &frame(&ControlMessage::Hello(hello))).await;
     let mut length = [0; LENGTH_BYTES];
     must(recv.read_exact(&mut length).await);
     tokio::spawn(async move {
         let _control = (send, recv);
         std::future::pending::<()>().await;
     });
-    (connection, endpoint)
+    connection
 }
 
 fn header(width: u16, length: u32, more: bool) -> ControlMessage {
@@ -178,10 +150,6 @@ fn header(width: u16, length: u32, more: bool) -> ControlMessage {
         length,
         more,
     })
-}
-
-fn frame(message: &ControlMessage) -> Vec<u8> {
-    must(message.to_frame())
 }
 
 /// The frame of a header with other numbers than an honest end can write.
@@ -196,7 +164,7 @@ fn bent(at: usize, with: &[u8]) -> Vec<u8> {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn what_a_hostile_node_sends_is_refused_and_named_and_ends_with_the_question() {
     let server = server().await;
-    let (connection, _endpoint) = stranger(&server, "left").await;
+    let connection = stranger(&server, "left").await;
     let endless = [frame(&header(8, 4, true)), vec![0; 4]].concat().repeat(40);
     let none = ControlMessage::NoPicture(NoPicture {
         reason: "\u{1b}[2J".into(),
@@ -257,7 +225,7 @@ async fn what_a_hostile_node_sends_is_refused_and_named_and_ends_with_the_questi
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_node_that_dribbles_is_given_up_and_keeps_no_other_waiting_longer() {
     let server = server().await;
-    let (connection, _endpoint) = stranger(&server, "left").await;
+    let connection = stranger(&server, "left").await;
     let front = node(&server, "front", true).await;
     let begun = Instant::now();
     let dribbling = async {

@@ -2,17 +2,15 @@
 
 use crate::support::*;
 use std::{
-    net::SocketAddr,
     sync::Arc,
     time::{Duration, Instant},
 };
 use taut_link::{
-    ClientOptions, LinkError, LinkEvent, Role, ServerOptions, binding, connect,
-    pinning::PinnedServer, serve, transport,
+    ClientOptions, LinkError, LinkEvent, Role, ServerLink, ServerOptions, connect, serve,
 };
 use taut_proto::{
     PROTOCOL_VERSION, VersionRange,
-    control::{ControlMessage, Hello, LENGTH_BYTES, Offers, RefusalCode, Transport},
+    control::{ControlMessage, LENGTH_BYTES, Refusal, RefusalCode},
     proof::{Claim, Grant},
 };
 
@@ -42,67 +40,43 @@ async fn the_key_of_another_workbench_meets_the_wrong_server_and_says_nothing_to
     assert!(server.clients().is_empty());
 }
 
-/// A peer that speaks QUIC but says `frame` first; returns what the server answers.
-async fn answer_to(server: SocketAddr, frame: &[u8]) -> ControlMessage {
-    let fail = |error: &dyn std::fmt::Display| -> ! { panic!("{error}") };
-    let pinned = Arc::new(PinnedServer::new(key('a').server_pin()));
-    let config = transport::client_config(pinned, Duration::from_secs(5))
-        .unwrap_or_else(|error| fail(&error));
-    let any = SocketAddr::from(([127, 0, 0, 1], 0));
-    let endpoint = quinn::Endpoint::client(any).unwrap_or_else(|error| fail(&error));
-    let connecting = endpoint
-        .connect_with(config, server, "taut")
-        .unwrap_or_else(|error| fail(&error));
-    let connection = connecting.await.unwrap_or_else(|error| fail(&error));
-    let (mut send, mut recv) = connection
-        .open_bi()
-        .await
-        .unwrap_or_else(|error| fail(&error));
-    send.write_all(frame)
-        .await
-        .unwrap_or_else(|error| fail(&error));
-    let answer = recv
-        .read_to_end(4096)
-        .await
-        .unwrap_or_else(|error| fail(&error));
-    ControlMessage::from_frame_body(&answer[LENGTH_BYTES..]).unwrap_or_else(|error| fail(&error))
+/// What the server answers to one who says `frame` first, and its code.
+async fn refusal(server: &ServerLink, frame: &[u8]) -> Refusal {
+    let connection = raw_connection(server.quic_addr(), raw_config(server.pin())).await;
+    let (_send, mut recv) = say(&connection, frame).await;
+    let answer = must(recv.read_to_end(4096).await);
+    match must(ControlMessage::from_frame_body(&answer[LENGTH_BYTES..])) {
+        ControlMessage::Refused(refusal) => refusal,
+        other => panic!("{other:?}"),
+    }
 }
 
-fn hello() -> Vec<u8> {
-    let hello = ControlMessage::Hello(Hello {
-        versions: VersionRange::SUPPORTED,
-        node: "stranger".into(),
+fn stranger() -> Vec<u8> {
+    let claim = Claim {
         role: Role::Render,
-        transport: Transport::Udp,
-        rate_hz: 0,
-        proof: [0; 32],
+        node: "stranger",
         grant: Grant::Master,
-        offers: Offers::NONE,
-    });
-    must(hello.to_frame())
+    };
+    frame(&ControlMessage::Hello(hello(claim, [0; 32])))
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn another_protocol_version_is_refused_and_counted() {
     let server = server().await;
-    let mut frame = hello();
+    let mut frame = stranger();
     // The range stands first in Hello.
     frame[LENGTH_BYTES + 4] = PROTOCOL_VERSION + 1;
     frame[LENGTH_BYTES + 5] = PROTOCOL_VERSION + 2;
-    match answer_to(server.quic_addr(), &frame).await {
-        ControlMessage::Refused(refusal) => {
-            assert_eq!(refusal.code, RefusalCode::WrongVersion);
-            assert_eq!(refusal.version, PROTOCOL_VERSION);
-            let both = format!(
-                "version {} to {}, this program speaks {}",
-                PROTOCOL_VERSION + 1,
-                PROTOCOL_VERSION + 2,
-                VersionRange::SUPPORTED
-            );
-            assert!(refusal.text.raw().contains(&both), "{}", refusal.text);
-        }
-        other => panic!("{other:?}"),
-    }
+    let refusal = refusal(&server, &frame).await;
+    assert_eq!(refusal.code, RefusalCode::WrongVersion);
+    assert_eq!(refusal.version, PROTOCOL_VERSION);
+    let both = format!(
+        "version {} to {}, this program speaks {}",
+        PROTOCOL_VERSION + 1,
+        PROTOCOL_VERSION + 2,
+        VersionRange::SUPPORTED
+    );
+    assert!(refusal.text.raw().contains(&both), "{}", refusal.text);
     assert_eq!(server.counters().wrong_version, 1);
     assert!(server.clients().is_empty());
 }
@@ -111,17 +85,14 @@ async fn another_protocol_version_is_refused_and_counted() {
 async fn a_hello_without_proof_or_sense_is_refused() {
     let server = server().await;
     for (frame, code) in [
-        (hello(), RefusalCode::WrongKey),
+        (stranger(), RefusalCode::WrongKey),
         (b"GET / HTTP/1.1\r\n\r\n".to_vec(), RefusalCode::BadHello),
         (
             vec![8, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8],
             RefusalCode::BadHello,
         ),
     ] {
-        match answer_to(server.quic_addr(), &frame).await {
-            ControlMessage::Refused(refusal) => assert_eq!(refusal.code, code),
-            other => panic!("{other:?}"),
-        }
+        assert_eq!(refusal(&server, &frame).await.code, code);
     }
     assert_eq!(server.counters().refused, 3);
     assert_eq!(server.counters().wrong_key, 1);
@@ -136,19 +107,10 @@ async fn a_hello_without_proof_or_sense_is_refused() {
 async fn a_second_node_of_one_name_is_refused_and_the_first_stays() {
     let server = server().await;
     let first = client(&server, Role::Render, "left").await;
-    match error_of(options(&server, Role::Render, "left")).await {
-        error @ LinkError::Refused {
-            code: RefusalCode::NameTaken,
-            ..
-        } => {
-            let text = error.to_string();
-            assert!(
-                text.contains("a node named \"left\" is connected already"),
-                "{text}"
-            );
-        }
-        other => panic!("{other}"),
-    }
+    let (code, text) = refusal_of(options(&server, Role::Render, "left")).await;
+    assert_eq!(code, RefusalCode::NameTaken);
+    let said = "a node named \"left\" is connected already";
+    assert!(text.contains(said), "{text}");
     assert_eq!(first.is_closed(), None);
     assert_eq!(server.clients().len(), 1);
     first.close().await;
@@ -191,17 +153,8 @@ async fn a_full_server_says_so() {
     .await;
     // The workbench's own node has its place; another one finds none.
     let _first = client(&server, Role::Render, "left").await;
-    let error = error_of(options(&server, Role::Render, "right")).await;
-    assert!(
-        matches!(
-            error,
-            LinkError::Refused {
-                code: RefusalCode::Full,
-                ..
-            }
-        ),
-        "{error}"
-    );
+    let (code, text) = refusal_of(options(&server, Role::Render, "right")).await;
+    assert_eq!(code, RefusalCode::Full, "{text}");
 }
 
 /// Whoever may be any observer fills the house; those whom the workbench cannot do without get in all the same.
@@ -241,45 +194,19 @@ async fn a_house_full_of_observers_has_room_for_device_tracker_operator_and_name
 /// A bridge that proves its key and then takes nothing: its place is free when its time to join is over.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_join_that_stalls_leaves_no_session_behind() {
-    let fail = |error: &dyn std::fmt::Display| -> ! { panic!("{error}") };
     let server = server().await;
-    let pinned = Arc::new(PinnedServer::new(key('a').server_pin()));
-    let mut config = transport::client_config(pinned, Duration::from_secs(5))
-        .unwrap_or_else(|error| fail(&error));
     let mut narrow = quinn::TransportConfig::default();
     narrow.stream_receive_window(quinn::VarInt::from_u32(16)); // less than a Welcome
+    let mut config = raw_config(server.pin());
     config.transport_config(Arc::new(narrow));
-    let any = SocketAddr::from(([127, 0, 0, 1], 0));
-    let endpoint = quinn::Endpoint::client(any).unwrap_or_else(|error| fail(&error));
-    let connecting = endpoint
-        .connect_with(config, server.quic_addr(), "taut")
-        .unwrap_or_else(|error| fail(&error));
-    let connection = connecting.await.unwrap_or_else(|error| fail(&error));
+    let connection = raw_connection(server.quic_addr(), config).await;
     let claim = Claim {
         role: Role::Device,
         node: "bridge",
         grant: Grant::Master,
     };
-    let bound = binding::proof_binding(&connection).unwrap_or_else(|error| fail(&error));
-    let secret = key('a').join_secret(claim.role, claim.node, claim.grant);
-    let hello = ControlMessage::Hello(Hello {
-        versions: VersionRange::SUPPORTED,
-        node: claim.node.into(),
-        role: claim.role,
-        transport: Transport::Udp,
-        rate_hz: 0,
-        proof: secret.client_proof(&bound, claim),
-        grant: claim.grant,
-        offers: Offers::NONE,
-    });
-    let frame = hello.to_frame().unwrap_or_else(|error| fail(&error));
-    let (mut send, _recv) = connection
-        .open_bi()
-        .await
-        .unwrap_or_else(|error| fail(&error));
-    send.write_all(&frame)
-        .await
-        .unwrap_or_else(|error| fail(&error));
+    let hello = ControlMessage::Hello(proved_hello(&connection, claim));
+    let _control = say(&connection, &frame(&hello)).await;
     wait_until("its place", || server.clients().len() == 1).await;
     wait_until("the end of its time", || server.clients().is_empty()).await;
     client(&server, Role::Device, "bridge").await.close().await;
@@ -289,17 +216,8 @@ async fn a_join_that_stalls_leaves_no_session_behind() {
 async fn names_that_cannot_be_shown_are_refused() {
     let server = server().await;
     for name in ["", "  ", "a\nb", &"x".repeat(65)] {
-        let error = error_of(options(&server, Role::Render, name)).await;
-        assert!(
-            matches!(
-                error,
-                LinkError::Refused {
-                    code: RefusalCode::BadHello,
-                    ..
-                }
-            ),
-            "{name:?}: {error}"
-        );
+        let (code, text) = refusal_of(options(&server, Role::Render, name)).await;
+        assert_eq!(code, RefusalCode::BadHello, "{name:?}: {text}");
     }
 }
 
@@ -307,16 +225,8 @@ async fn names_that_cannot_be_shown_are_refused() {
 async fn a_port_in_use_is_named() {
     let first = server().await;
     for (quic, udp, busy) in [
-        (
-            first.quic_addr(),
-            SocketAddr::from(([127, 0, 0, 1], 0)),
-            first.quic_addr(),
-        ),
-        (
-            SocketAddr::from(([127, 0, 0, 1], 0)),
-            first.udp_addr(),
-            first.udp_addr(),
-        ),
+        (first.quic_addr(), ANY, first.quic_addr()),
+        (ANY, first.udp_addr(), first.udp_addr()),
     ] {
         let options = ServerOptions {
             quic,
@@ -333,7 +243,7 @@ async fn a_port_in_use_is_named() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn an_unreachable_server_is_given_up_in_time() {
     // A port that was free a moment ago, where nobody listens.
-    let socket = must(std::net::UdpSocket::bind("127.0.0.1:0"));
+    let socket = must(std::net::UdpSocket::bind(ANY));
     let address = must(socket.local_addr());
     drop(socket);
     let start = Instant::now();

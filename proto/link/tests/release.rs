@@ -1,11 +1,8 @@
 //! Two releases meet: they agree on a version, or part by name, at both ends.
 
 use crate::support::*;
-use std::{net::SocketAddr, sync::Arc, time::Duration};
-use taut_link::{
-    ClientLink, ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport, connect,
-    pinning::PinnedServer, transport,
-};
+use std::net::SocketAddr;
+use taut_link::{ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport};
 use taut_proto::{
     PROTOCOL_VERSION, VersionRange,
     control::{ControlMessage, LENGTH_BYTES, RefusalCode},
@@ -30,10 +27,6 @@ fn kept(name: &str) -> Vec<u8> {
         .collect()
 }
 
-async fn joined(options: ClientOptions) -> ClientLink {
-    must(connect(options).await)
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_server_of_n_to_n_plus_1_and_a_client_of_n_plus_1_to_n_plus_2_speak_n_plus_1() {
     let port = relay_port();
@@ -48,15 +41,15 @@ async fn a_server_of_n_to_n_plus_1_and_a_client_of_n_plus_1_to_n_plus_2_speak_n_
         versions: range(NEXT, NEXT + 1),
         ..options(&server, role, name)
     };
-    let render = joined(newer(Role::Render, "left")).await;
-    let device = joined(newer(Role::Device, "bridge")).await;
-    let quic = joined(ClientOptions {
+    let render = join(newer(Role::Render, "left")).await;
+    let device = join(newer(Role::Device, "bridge")).await;
+    let quic = join(ClientOptions {
         transport: Transport::QuicDatagram,
         ..newer(Role::Observer, "watcher")
     })
     .await;
     // One of this release beside them is served in its own version.
-    let older = joined(options(&server, Role::Observer, "older")).await;
+    let older = join(options(&server, Role::Observer, "older")).await;
     for (link, version) in [
         (&render, NEXT),
         (&device, NEXT),
@@ -122,15 +115,8 @@ async fn without_a_common_version_both_ends_name_both() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_node_of_the_release_before_is_told_in_words_that_it_can_read() {
     let server = server().await;
-    let pinned = Arc::new(PinnedServer::new(key('a').server_pin()));
-    let config = must(transport::client_config(pinned, Duration::from_secs(5)));
-    let endpoint = must(quinn::Endpoint::client(SocketAddr::from((
-        [127, 0, 0, 1],
-        0,
-    ))));
-    let connection = must(must(endpoint.connect_with(config, server.quic_addr(), "taut")).await);
-    let (mut send, mut recv) = must(connection.open_bi().await);
-    must(send.write_all(&kept("hello")).await);
+    let connection = raw_connection(server.quic_addr(), raw_config(server.pin())).await;
+    let (_send, mut recv) = say(&connection, &kept("hello")).await;
     let answer = must(recv.read_to_end(4096).await);
     // Magic, a version that it does not look at, Refused, wrong version, the server's newest, a sentence.
     assert_eq!(
@@ -159,18 +145,7 @@ fn server_of_version_3() -> SocketAddr {
     ));
     let parameters = must(rcgen::CertificateParams::new(["taut".to_owned()]));
     let certificate = must(parameters.self_signed(&signing));
-    let provider = Arc::new(rustls::crypto::ring::default_provider());
-    let builder = rustls::ServerConfig::builder_with_provider(provider);
-    let mut tls = must(
-        must(builder.with_protocol_versions(&[&rustls::version::TLS13]))
-            .with_no_client_auth()
-            .with_single_cert(vec![certificate.der().clone()], private.into()),
-    );
-    tls.alpn_protocols = vec![b"taut".to_vec()];
-    let crypto = must(quinn::crypto::rustls::QuicServerConfig::try_from(tls));
-    let any = SocketAddr::from(([127, 0, 0, 1], 0));
-    let config = quinn::ServerConfig::with_crypto(Arc::new(crypto));
-    let endpoint = must(quinn::Endpoint::server(config, any));
+    let endpoint = raw_server(certificate.der().clone(), private);
     let address = must(endpoint.local_addr());
     tokio::spawn(async move {
         let connection = must(endpoint.accept().await.expect("a client").await);

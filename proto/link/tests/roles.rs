@@ -3,7 +3,7 @@
 use crate::support::*;
 use taut_link::{
     Act, ClientLink, ClientOptions, Credential, Holder, JoinPolicy, LinkError, LinkEvent, Role,
-    ServerLink, ServerOptions, Transport, connect,
+    ServerLink, ServerOptions, Transport,
 };
 use taut_proto::{
     ForceSample, HeadSample, PoseF64,
@@ -26,10 +26,6 @@ fn with(server: &ServerLink, role: Role, node: &str, credential: Credential) -> 
 /// With the credential of exactly this role and name.
 fn own(server: &ServerLink, role: Role, node: &str, issue: u16) -> ClientOptions {
     with(server, role, node, credential(role, node, issue))
-}
-
-async fn join(options: ClientOptions) -> ClientLink {
-    must(connect(options).await)
 }
 
 fn head(index: u64) -> HeadSample {
@@ -226,13 +222,9 @@ async fn the_newest_reading_of_the_head_reaches_both_readers() {
 async fn there_is_one_tracker_at_a_time() {
     let server = server().await;
     let _first = client(&server, Role::Tracker, "tracker").await;
-    match error_of(options(&server, Role::Tracker, "another")).await {
-        LinkError::Refused { code, text, .. } => {
-            assert_eq!(code, RefusalCode::TrackerTaken);
-            assert!(text.raw().contains("head tracker \"tracker\""), "{text}");
-        }
-        other => panic!("{other}"),
-    }
+    let (code, text) = refusal_of(options(&server, Role::Tracker, "another")).await;
+    assert_eq!(code, RefusalCode::TrackerTaken);
+    assert!(text.contains("head tracker \"tracker\""), "{text}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -271,16 +263,9 @@ async fn a_revoked_credential_and_a_closed_role_stay_outside_and_a_new_issue_com
         (Role::Device, "bridge", RefusalCode::Revoked),
         (Role::Observer, "web", RefusalCode::RoleClosed),
     ] {
-        let options = own(&server, role, name, 1);
-        match error_of(options).await {
-            LinkError::Refused {
-                code: found, text, ..
-            } => {
-                assert_eq!(found, code, "{text}");
-                assert!(text.raw().contains("network."), "{text}");
-            }
-            other => panic!("{name}: {other}"),
-        }
+        let (found, text) = refusal_of(own(&server, role, name, 1)).await;
+        assert_eq!(found, code, "{name}: {text}");
+        assert!(text.contains("network."), "{text}");
     }
     assert_eq!(server.counters().shut_out, 3);
     let _second = join(own(&server, Role::Render, "left", 2)).await;
@@ -291,17 +276,8 @@ async fn a_revoked_credential_and_a_closed_role_stay_outside_and_a_new_issue_com
 async fn a_name_of_a_screen_is_not_for_others() {
     let server = server().await;
     let any = credential(Role::Observer, "*", 1);
-    let taken = error_of(with(&server, Role::Observer, "left", any.clone())).await;
-    assert!(
-        matches!(
-            taken,
-            LinkError::Refused {
-                code: RefusalCode::NameTaken,
-                ..
-            }
-        ),
-        "{taken}"
-    );
+    let (taken, text) = refusal_of(with(&server, Role::Observer, "left", any.clone())).await;
+    assert_eq!(taken, RefusalCode::NameTaken, "{text}");
     let _free = join(with(&server, Role::Observer, "watcher", any)).await;
 }
 
@@ -343,10 +319,7 @@ async fn who_is_revoked_while_he_is_in_goes_out_and_the_others_stay() {
     wait_until("the end", || left.is_closed().is_some()).await;
     let reason = left.is_closed().unwrap_or_default();
     assert!(reason.contains("revoked"), "{reason}");
-    match error_of(old).await {
-        LinkError::Refused { code, .. } => assert_eq!(code, RefusalCode::Revoked),
-        other => panic!("{other}"),
-    }
+    assert_eq!(refusal_of(old).await.0, RefusalCode::Revoked);
     assert!(web.is_closed().is_none());
     let next = credential(Role::Render, "left", 2);
     join(with(&server, Role::Render, "left", next)).await;

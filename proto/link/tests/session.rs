@@ -3,7 +3,8 @@
 use crate::support::*;
 use std::time::Duration;
 use taut_link::{
-    ClientOptions, Content, LinkError, LinkEvent, Role, ServerOptions, Transport, serve,
+    ClientOptions, Content, DeviceInput, LinkError, LinkEvent, Role, ServerLink, ServerOptions,
+    Transport, serve,
 };
 use taut_proto::{
     ClientStats, Finish, Look, Looks, MeshHash, Panorama, Texture, TextureUse, Textures, Wrap,
@@ -11,6 +12,11 @@ use taut_proto::{
     control::{LogLevel, RefusalCode},
     stats::DrawnState,
 };
+
+fn inputs(server: &ServerLink) -> triple_buffer::Output<Option<DeviceInput>> {
+    let inputs = server.device_inputs();
+    inputs.expect("the first taker gets the inputs")
+}
 
 async fn states_arrive_over(transport: Transport) {
     let server = server().await;
@@ -28,14 +34,7 @@ async fn states_arrive_over(transport: Transport) {
         );
     }
 
-    let mut broadcaster = server.broadcaster();
-    let mut states = Vec::new();
-    broadcast_until(&mut broadcaster, 1, || {
-        client.drain_states(&mut states);
-        states.len() >= 500
-    })
-    .await;
-    assert_in_order(&states);
+    take_states(&server, &client, 1, 500).await;
     assert_eq!(server.counters().garbage + server.counters().forged, 0);
     let status = &server.clients()[0];
     assert_eq!(
@@ -61,14 +60,8 @@ async fn states_arrive_in_order_over_quic_datagrams() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_node_that_joins_late_gets_everything() {
     let server = server().await;
-    let mut broadcaster = server.broadcaster();
     let first = client(&server, Role::Render, "left").await;
-    let mut seen = Vec::new();
-    let tick = broadcast_until(&mut broadcaster, 1, || {
-        first.drain_states(&mut seen);
-        seen.len() >= 50
-    })
-    .await;
+    let tick = take_states(&server, &first, 1, 50).await;
 
     let late = client(&server, Role::Render, "late").await;
     assert_eq!(late.description(), first.description());
@@ -79,7 +72,7 @@ async fn a_node_that_joins_late_gets_everything() {
         .unwrap_or_else(|error| panic!("{error}: {:?}", late.is_closed()));
     assert_eq!(mesh.triangles().len(), 27_000);
     let (mut of_first, mut of_late) = (Vec::new(), Vec::new());
-    broadcast_until(&mut broadcaster, tick, || {
+    broadcast_until(&mut server.broadcaster(), tick, || {
         first.drain_states(&mut of_first);
         late.drain_states(&mut of_late);
         of_late.len() >= 50
@@ -101,21 +94,12 @@ async fn a_node_that_joins_late_gets_everything() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_client_gets_no_more_states_than_it_asked_for() {
     let server = server().await;
-    let mut broadcaster = server.broadcaster();
-    let slow = must(
-        taut_link::connect(ClientOptions {
-            rate_hz: 100,
-            ..options(&server, Role::Observer, "slow")
-        })
-        .await,
-    );
-    let mut states = Vec::new();
-    broadcast_until(&mut broadcaster, 1, || {
-        slow.drain_states(&mut states);
-        states.len() >= 20
+    let slow = join(ClientOptions {
+        rate_hz: 100,
+        ..options(&server, Role::Observer, "slow")
     })
     .await;
-    assert_in_order(&states);
+    let (_, states) = states_of(&server, &slow, 1, 20).await;
     for pair in states.windows(2) {
         assert!(
             pair[1].state.tick - pair[0].state.tick >= 9,
@@ -127,9 +111,7 @@ async fn a_client_gets_no_more_states_than_it_asked_for() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn device_input_reaches_the_haptics_loop_and_the_wrench_comes_back() {
     let server = server().await;
-    let mut inputs = server
-        .device_inputs()
-        .expect("the first taker gets the inputs");
+    let mut inputs = inputs(&server);
     assert!(server.device_inputs().is_none(), "there is one reader");
     let bridge = client(&server, Role::Device, "bridge").await;
     let mut index = 0;
@@ -168,9 +150,7 @@ async fn device_input_reaches_the_haptics_loop_and_the_wrench_comes_back() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn device_input_of_a_render_node_is_refused() {
     let server = server().await;
-    let mut inputs = server
-        .device_inputs()
-        .expect("the first taker gets the inputs");
+    let mut inputs = inputs(&server);
     let render = client(&server, Role::Render, "left").await;
     wait_until("refusal", || {
         render.send_input(&input(1));
@@ -184,9 +164,7 @@ async fn device_input_of_a_render_node_is_refused() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_device_pose_that_is_no_pose_never_reaches_the_loop() {
     let server = server().await;
-    let mut inputs = server
-        .device_inputs()
-        .expect("the first taker gets the inputs");
+    let mut inputs = inputs(&server);
     let bridge = client(&server, Role::Device, "bridge").await;
     let mut bent = input(1);
     bent.pose.rotation = [0.5, 0.0, 0.0, 0.0];
@@ -211,14 +189,9 @@ async fn a_device_pose_that_is_no_pose_never_reaches_the_loop() {
 async fn there_is_one_device_bridge() {
     let server = server().await;
     let _bridge = client(&server, Role::Device, "bridge").await;
-    match error_of(options(&server, Role::Device, "second")).await {
-        LinkError::Refused {
-            code: RefusalCode::DeviceTaken,
-            text,
-            ..
-        } => assert!(text.raw().contains("\"bridge\""), "{text}"),
-        other => panic!("{other}"),
-    }
+    let (code, text) = refusal_of(options(&server, Role::Device, "second")).await;
+    assert_eq!(code, RefusalCode::DeviceTaken);
+    assert!(text.contains("\"bridge\""), "{text}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -255,13 +228,7 @@ async fn session_time_is_within_its_stated_uncertainty() {
 async fn reports_and_log_lines_reach_the_server_and_drawn_states_are_compared() {
     let server = server().await;
     let client = client(&server, Role::Render, "left").await;
-    let mut broadcaster = server.broadcaster();
-    let mut states = Vec::new();
-    broadcast_until(&mut broadcaster, 1, || {
-        client.drain_states(&mut states);
-        states.len() >= 3
-    })
-    .await;
+    let (_, states) = states_of(&server, &client, 1, 3).await;
     let drawn = |received: &taut_link::ReceivedState, flip: u64| DrawnState {
         tick: received.state.tick,
         state_hash: received.state_hash ^ flip,
@@ -376,10 +343,7 @@ async fn the_light_around_the_scene_comes_by_its_hash_and_is_not_served_without(
     let server = must(serve(ServerOptions::loopback(key('a')), content).await);
     let client = client(&server, Role::Render, "left").await;
     assert_eq!(client.description().environment, Some(hash));
-    match client.panorama(hash).await {
-        Ok(found) => assert_eq!(found, light),
-        Err(error) => panic!("{error}"),
-    }
+    assert_eq!(must(client.panorama(hash).await), light);
     // A mesh is no light.
     let mesh = client.description().god_object.mesh;
     assert!(matches!(

@@ -5,36 +5,28 @@
 use crate::support::*;
 use std::{
     collections::{HashMap, HashSet},
-    net::SocketAddr,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::JoinHandle,
+    sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 use taut_link::{
-    ClientLink, ClientOptions, FrameTurn, LinkError, LinkHealth, RejoinPolicy, Renewal, Role,
-    ServerLink, ServerOptions, SupervisedLink, serve,
+    ClientLink, ClientOptions, FrameTurn, LinkHealth, RejoinPolicy, Renewal, Role, ServerLink,
+    ServerOptions, SupervisedLink,
 };
 use taut_proto::{
     Payload,
-    barrier::{FRAMES_LEFT_OUT, MasterSettings, Release, ReleaseHead, Swap},
+    barrier::{FRAMES_LEFT_OUT, Release, ReleaseHead, Swap},
 };
 use tokio::runtime::Runtime;
 
-const PERIOD: Duration = Duration::from_millis(33);
 /// Silence after which nodes and server give each other up: a node leads after three tenths of it. Long for a busy machine, short for a test.
 const SILENCE: Duration = Duration::from_secs(2);
 /// Longest that a frame waits for a node.
 const LOOSE_PATIENCE: Duration = Duration::from_millis(250);
 
-/// A server with threads and a runtime of its own, so that it can die without a word.
+/// A server that broadcasts and leads frames until it dies without a word.
 struct Leader {
-    runtime: Runtime,
-    server: ServerLink,
-    stop: Arc<AtomicBool>,
-    threads: Vec<JoinHandle<()>>,
+    workers: Vec<Worker>,
+    server: Mortal,
     /// Fingerprints of all states that it broadcast.
     sent: Arc<Mutex<HashSet<u64>>>,
 }
@@ -44,71 +36,35 @@ fn all<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 }
 
 impl Leader {
-    fn start(addresses: Option<(SocketAddr, SocketAddr)>) -> Leader {
-        let runtime = runtime();
-        let any = SocketAddr::from(([127, 0, 0, 1], 0));
-        let (quic, udp) = addresses.unwrap_or((any, any));
+    fn start(addresses: Option<Addresses>) -> Leader {
         let options = ServerOptions {
-            quic,
-            udp,
             idle_timeout: FORGIVING,
             node_timeout: SILENCE,
-            frames: Some(MasterSettings {
-                swap: Swap::Immediate,
-                period_ns: PERIOD.as_nanos() as u64,
-                slowest_ns: 1_000_000_000,
-            }),
+            frames: Some(leading(Swap::Immediate)),
             ..ServerOptions::loopback(key('a'))
         };
-        let server = must(runtime.block_on(serve(options, content())));
-        let stop = Arc::new(AtomicBool::new(false));
+        let server = Mortal::start(options, addresses);
         let sent = Arc::<Mutex<HashSet<u64>>>::default();
-        let (mut broadcaster, clock) = (server.broadcaster(), server.clock());
-        let (over, hashes) = (stop.clone(), sent.clone());
-        let states = thread("states", move || {
-            while !over.load(Ordering::SeqCst) {
-                let mut now = state(clock.now_ns() / 1_000_000 + 1);
-                now.sample_time_ns = clock.now_ns();
-                all(&hashes).extend(now.hash().ok());
-                broadcaster.send(&now);
-                std::thread::sleep(Duration::from_millis(1));
-            }
-        });
-        let over = stop.clone();
-        let mut master = server
-            .frame_master()
-            .unwrap_or_else(|| panic!("it leads frames"));
-        let frames = thread("frames", move || {
-            master.run(&|| over.load(Ordering::SeqCst));
+        let hashes = sent.clone();
+        let workers = broadcasting(&server.link, move |state| {
+            all(&hashes).extend(state.hash().ok());
         });
         Leader {
-            runtime,
+            workers,
             server,
-            stop,
-            threads: vec![states, frames],
             sent,
         }
     }
 
-    /// Its endpoint is gone before it could say anything; the addresses that it had, free.
-    fn die(mut self) -> (SocketAddr, SocketAddr) {
-        self.stop.store(true, Ordering::SeqCst);
-        for thread in self.threads.drain(..) {
-            assert!(thread.join().is_ok());
-        }
-        let addresses = (self.server.quic_addr(), self.server.udp_addr());
-        self.runtime.shutdown_timeout(PATIENCE);
-        drop(self.server);
-        until("the port", || {
-            std::net::UdpSocket::bind(addresses.1).is_ok()
-        });
-        addresses
+    fn die(self) -> Addresses {
+        drop(self.workers);
+        self.server.die()
     }
 
     /// Waits until so many nodes have told of ten frames that they showed together.
     fn in_step(&self, nodes: usize) {
         until("step", || {
-            let report = self.server.frame_report().unwrap_or_default();
+            let report = self.server.link.frame_report().unwrap_or_default();
             report
                 .nodes
                 .iter()
@@ -116,17 +72,6 @@ impl Leader {
                 .count()
                 >= nodes
         });
-    }
-}
-
-fn until(what: &str, mut done: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !done() {
-        assert!(
-            start.elapsed() < 2 * PATIENCE,
-            "{what}: did not happen in time"
-        );
-        std::thread::sleep(Duration::from_millis(5));
     }
 }
 
@@ -144,12 +89,12 @@ struct Shown {
 /// A node that joins again, and "draws" for some milliseconds per frame.
 struct Screen {
     runtime: Option<Runtime>,
-    supervised: Arc<SupervisedLink<()>>,
+    /// Let go of when it can say nothing to anybody any more.
+    _supervised: Arc<SupervisedLink<()>>,
     /// Its first link.
     first: Arc<ClientLink>,
     shown: Arc<Mutex<Vec<Shown>>>,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    worker: Option<Worker>,
 }
 
 fn joining(server: &ServerLink, node: &str) -> ClientOptions {
@@ -159,30 +104,16 @@ fn joining(server: &ServerLink, node: &str) -> ClientOptions {
 impl Screen {
     fn start(leader: &Leader, name: &str, draws_ms: u64) -> Screen {
         let runtime = runtime();
-        let prepare = |_: Arc<ClientLink>| async { Ok::<(), LinkError>(()) };
-        let joined = SupervisedLink::join(
-            joining(&leader.server, name),
-            RejoinPolicy::default(),
-            prepare,
-        );
-        let (supervised, first, ()) = must(runtime.block_on(joined));
-        let mut screen = Screen {
-            runtime: Some(runtime),
-            supervised: Arc::new(supervised),
-            first: first.clone(),
-            shown: Arc::default(),
-            stop: Arc::default(),
-            thread: None,
-        };
-        let (supervised, shown, stop) = (
-            screen.supervised.clone(),
-            screen.shown.clone(),
-            screen.stop.clone(),
-        );
-        let body = move || {
-            let (mut link, mut sessions) = (first, 1);
+        let options = joining(&leader.server.link, name);
+        let (supervised, first) = supervised(&runtime, options, RejoinPolicy::default());
+        let supervised = Arc::new(supervised);
+        let shown = Arc::<Mutex<Vec<Shown>>>::default();
+        let own = (supervised.clone(), first.clone(), shown.clone());
+        let body = move |is_over: &dyn Fn() -> bool| {
+            let (supervised, mut link, shown) = own;
+            let mut sessions = 1;
             let mut gate = link.frame_gate(Duration::ZERO);
-            while !stop.load(Ordering::SeqCst) {
+            while !is_over() {
                 match supervised.take_renewal() {
                     Some(Renewal::Session { link: next, .. }) => {
                         (link, sessions) = (next, sessions + 1);
@@ -212,8 +143,13 @@ impl Screen {
             }
             drop(gate);
         };
-        screen.thread = Some(thread(name, body));
-        screen
+        Screen {
+            runtime: Some(runtime),
+            _supervised: supervised,
+            first,
+            shown,
+            worker: Some(Worker::start(name, body)),
+        }
     }
 
     /// Frames shown with numbers above this one.
@@ -227,27 +163,16 @@ impl Screen {
         let shown = all(&self.shown);
         shown.last().map_or(0, |shown| shown.frame)
     }
+}
 
-    /// As a crash: nothing is said to anybody.
-    fn die(mut self) {
-        self.end();
-    }
-
-    fn end(&mut self) {
-        self.stop.store(true, Ordering::SeqCst);
-        if let Some(thread) = self.thread.take() {
-            assert!(thread.join().is_ok() || std::thread::panicking());
-        }
+/// As a crash: nothing is said to anybody.
+impl Drop for Screen {
+    fn drop(&mut self) {
+        drop(self.worker.take());
         self.first.abandon();
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();
         }
-    }
-}
-
-impl Drop for Screen {
-    fn drop(&mut self) {
-        self.end();
     }
 }
 
@@ -331,7 +256,7 @@ fn nodes_swap_together_when_the_server_dies_and_when_their_leader_dies_until_the
 
     // The one that leads dies: the next takes over.
     let led_from = given_up + FRAMES_LEFT_OUT / 2;
-    left.die();
+    drop(left);
     let two = [&middle, &right];
     until("frames without the first leader", || {
         many(&two, led_from, 40)
@@ -353,7 +278,7 @@ fn nodes_swap_together_when_the_server_dies_and_when_their_leader_dies_until_the
         std::thread::sleep(Duration::from_millis(200));
         assert_eq!(screen.first.counters().packets_sent, sent);
     }
-    let report = again.server.frame_report().unwrap_or_default();
+    let report = again.server.link.frame_report().unwrap_or_default();
     assert_eq!((report.counts.mismatches, report.counts.reclaimed), (0, 0));
     drop((middle, right));
     again.die();
@@ -366,7 +291,7 @@ fn a_member_that_lies_makes_nobody_draw_what_the_server_did_not_send_and_is_not_
     let left = Screen::start(&leader, "left", 2);
     let right = Screen::start(&leader, "right", 2);
     let runtime = runtime();
-    let liar = must(runtime.block_on(taut_link::connect(joining(&leader.server, "liar"))));
+    let liar = must(runtime.block_on(taut_link::connect(joining(&leader.server.link, "liar"))));
     leader.in_step(2);
     until("the roster", || {
         liar.roster().is_some_and(|roster| {
@@ -401,7 +326,7 @@ fn a_member_that_lies_makes_nobody_draw_what_the_server_did_not_send_and_is_not_
     });
     let before = left.newest();
     assert!(before < 5000, "frame {before}");
-    let report = leader.server.frame_report().unwrap_or_default();
+    let report = leader.server.link.frame_report().unwrap_or_default();
     assert_eq!((report.counts.mismatches, report.counts.reclaimed), (0, 0));
 
     // When the server is gone a member may disturb frames; the pictures stay those of the server.

@@ -1,29 +1,30 @@
 //! A small scene, states, and a server on free ports of 127.0.0.1.
 
+mod raw;
+mod states;
+mod threads;
+
+pub use raw::*;
+pub use states::*;
 use std::{
     net::SocketAddr,
-    thread::JoinHandle,
     time::{Duration, Instant},
 };
 use taut_link::{
-    Broadcaster, ClientLink, ClientOptions, ClientStatus, ClusterKey, Content, LinkError,
-    LinkEvent, ReceivedState, Role, ServerLink, ServerOptions, Transport, connect, serve,
+    ClientLink, ClientOptions, ClientStatus, ClusterKey, Content, LinkError, LinkEvent, Role,
+    ServerLink, ServerOptions, Transport, connect, serve,
 };
 use taut_proto::{
-    HotState, InputSample, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
+    HotState, InputSample, MeshBlob, MeshHash, PoseF64, SceneDescription,
+    control::RefusalCode,
     mesh_blob::Positions,
     scene::{BodyDescription, NodeDescription, ScreenDescription, Stereo, WindowDescription},
-    state::{RunState, ToolState},
 };
 use taut_test_kit::relay::{Direction, Impairment, Relay, Treatment, Waiting};
-use tokio::runtime::Runtime;
+pub use threads::*;
 
 /// Only a hang takes this long; every wait ends as soon as its condition holds.
 pub const PATIENCE: Duration = Duration::from_secs(60);
-
-/// States that may be on the way at once where a test counts losses: more than a socket's buffer holds would be lost by a starved
-/// machine, and not by what is tested.
-pub const MAX_ON_THE_WAY: u64 = 50;
 
 /// Silence that a busy test machine may cause.
 pub const FORGIVING: Duration = Duration::from_secs(4);
@@ -120,37 +121,21 @@ pub fn options(server: &ServerLink, role: Role, node: &str) -> ClientOptions {
     }
 }
 
+pub async fn join(options: ClientOptions) -> ClientLink {
+    must(connect(options).await)
+}
+
 pub async fn client(server: &ServerLink, role: Role, node: &str) -> ClientLink {
-    must(connect(options(server, role, node)).await)
+    join(options(server, role, node)).await
 }
 
 /// A render node, with this transport.
 pub async fn node_over(transport: Transport, server: &ServerLink, node: &str) -> ClientLink {
-    let options = ClientOptions {
+    join(ClientOptions {
         transport,
         ..options(server, Role::Render, node)
-    };
-    must(connect(options).await)
-}
-
-/// State of `tick`, 1 kHz, whose numbers tell the tick.
-pub fn state(tick: u64) -> HotState {
-    let mut state = HotState {
-        tick,
-        sample_time_ns: tick * 1_000_000,
-        scene_revision: 7,
-        run: RunState::Running,
-        ..HotState::empty()
-    };
-    state.tools.push(ToolState {
-        god_object: PoseF32 {
-            position: [tick as f32 * 1e-6, 0.0, 0.1],
-            ..PoseF32::IDENTITY
-        },
-        force: [0.0, 1.5, tick as f32 * 1e-3],
-        ..ToolState::default()
-    });
-    state
+    })
+    .await
 }
 
 pub fn input(index: u64) -> InputSample {
@@ -198,73 +183,20 @@ pub fn lost_down(relay: &Relay) -> u64 {
     counts.all_lost() + counts.flipped
 }
 
-/// Sends states of growing tick until `done`, one per millisecond; gives up after [`PATIENCE`]. Returns the next tick.
-pub async fn broadcast_until(
-    broadcaster: &mut Broadcaster,
-    first: u64,
-    mut done: impl FnMut() -> bool,
-) -> u64 {
+/// Asks until there is an answer.
+pub async fn wait_for<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
-    let mut tick = first;
-    while !done() {
-        assert!(
-            start.elapsed() < PATIENCE,
-            "what was waited for did not happen by tick {tick}"
-        );
-        broadcaster.send(&state(tick));
-        tick += 1;
-        tokio::time::sleep(Duration::from_millis(1)).await;
-    }
-    tick
-}
-
-/// Sends states until `client` has `count` of them; the next tick.
-pub async fn take_states(
-    server: &ServerLink,
-    client: &ClientLink,
-    first: u64,
-    count: usize,
-) -> u64 {
-    let mut states = Vec::new();
-    let next = broadcast_until(&mut server.broadcaster(), first, || {
-        client.drain_states(&mut states);
-        states.len() >= count
-    })
-    .await;
-    assert_in_order(&states);
-    next
-}
-
-/// As [`broadcast_until`], but a state is sent only while fewer than [`MAX_ON_THE_WAY`] states are neither in `settled` nor lost on purpose.
-/// `settled` says how many states have arrived so far, or were lost where the test wants it.
-pub async fn broadcast_in_step_until(
-    broadcaster: &mut Broadcaster,
-    first: u64,
-    mut settled: impl FnMut() -> u64,
-    mut done: impl FnMut() -> bool,
-) -> u64 {
-    let (start, settled_before) = (Instant::now(), settled());
-    let mut tick = first;
-    while !done() {
-        assert!(
-            start.elapsed() < PATIENCE,
-            "what was waited for did not happen by tick {tick}"
-        );
-        if tick - first < settled() - settled_before + MAX_ON_THE_WAY {
-            broadcaster.send(&state(tick));
-            tick += 1;
+    loop {
+        if let Some(answer) = ask() {
+            return answer;
         }
-        tokio::time::sleep(Duration::from_millis(1)).await;
-    }
-    tick
-}
-
-pub async fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !done() {
         assert!(start.elapsed() < PATIENCE, "{what}: did not happen in time");
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
+}
+
+pub async fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
+    wait_for(what, || done().then_some(())).await;
 }
 
 /// Waits until the server knows where every client's datagrams come from.
@@ -284,37 +216,15 @@ pub async fn a_reading_arrives(device: &ClientLink, server: &ServerLink) {
     .await;
 }
 
-pub fn drain(client: &ClientLink) -> Vec<ReceivedState> {
-    let mut states = Vec::new();
-    client.drain_states(&mut states);
-    states
-}
-
 pub async fn event(
     server: &ServerLink,
     what: &str,
     mut wanted: impl FnMut(&LinkEvent) -> bool,
 ) -> LinkEvent {
-    let start = Instant::now();
-    loop {
-        while let Some(event) = server.try_event() {
-            if wanted(&event) {
-                return event;
-            }
-        }
-        assert!(start.elapsed() < PATIENCE, "{what}: no such event");
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
-}
-
-pub fn assert_in_order(states: &[ReceivedState]) {
-    for pair in states.windows(2) {
-        assert!(pair[0].state.tick < pair[1].state.tick);
-    }
-    for received in states {
-        assert_eq!(received.state, state(received.state.tick));
-        assert_eq!(Ok(received.state_hash), received.state.hash());
-    }
+    wait_for(what, || {
+        std::iter::from_fn(|| server.try_event()).find(&mut wanted)
+    })
+    .await
 }
 
 /// Why a client is not let in.
@@ -325,28 +235,18 @@ pub async fn error_of(options: ClientOptions) -> LinkError {
     }
 }
 
+/// With which code and words a client is refused.
+pub async fn refusal_of(options: ClientOptions) -> (RefusalCode, String) {
+    match error_of(options).await {
+        LinkError::Refused { code, text, .. } => (code, text.raw().to_owned()),
+        other => panic!("{other}"),
+    }
+}
+
 /// Why it is not served.
 pub async fn not_served(options: ServerOptions, content: Content) -> LinkError {
     match serve(options, content).await {
         Err(error) => error,
         Ok(_) => panic!("served"),
     }
-}
-
-/// A runtime that a test can end before the others.
-pub fn runtime() -> Runtime {
-    must(
-        tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(1)
-            .enable_all()
-            .build(),
-    )
-}
-
-pub fn thread(name: &str, body: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
-    must(
-        std::thread::Builder::new()
-            .name(name.to_owned())
-            .spawn(body),
-    )
 }
