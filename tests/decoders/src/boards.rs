@@ -6,10 +6,7 @@ use taut_bridge::spidar_uart::{BoardInfo, Cycle};
 use taut_bridge::wooden::{BoardReport, HostReport};
 
 /// A message of the Inverse service: what may be used of it can be, and names are plain.
-pub(crate) fn haply_service(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
+pub(crate) fn haply_service(text: &str) {
     let said = match Said::parse(text) {
         Ok(said) => said,
         Err(error) => return assert!(!error.to_string().is_empty()),

@@ -22,20 +22,14 @@ const RECORDED: [&str; 3] = ["recording.json", "updates.csv", "forces.csv"];
 const MAX_RECORDS: usize = 100_000;
 
 /// A key file: what is read is written as the same digits.
-pub(crate) fn key_file(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
+pub(crate) fn key_file(text: &str) {
     if let Ok(key) = ClusterKey::parse(text) {
         assert_eq!(key.to_hex(), text.trim().to_ascii_lowercase());
     }
 }
 
 /// What a node joins by, a key or a credential: a credential that is read is written as the same.
-pub(crate) fn join_key(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
+pub(crate) fn join_key(text: &str) {
     if let Ok(JoinKey::Credential(credential)) = JoinKey::parse(text) {
         let again = Credential::parse(&credential.to_text());
         let again = again.unwrap_or_else(|error| panic!("written and not read: {error}"));
@@ -45,10 +39,7 @@ pub(crate) fn join_key(bytes: &[u8]) {
 }
 
 /// A scene file; its meshes are not loaded. Reading it twice gives the same.
-pub(crate) fn scene_toml(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
+pub(crate) fn scene_toml(text: &str) {
     match Scene::parse("fuzz.toml", text, Path::new(NOWHERE)) {
         Ok(scene) => {
             let again = Scene::parse("fuzz.toml", text, Path::new(NOWHERE));
@@ -59,10 +50,7 @@ pub(crate) fn scene_toml(bytes: &[u8]) {
 }
 
 /// Edits of a scene, a line each: what comes out is a scene that is read as the same, with its name and the keys that were named.
-pub(crate) fn scene_edit(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
+pub(crate) fn scene_edit(text: &str) {
     thread_local! {
         static SCENE: Scene = Scene::named_or_file("sphere-on-plane").unwrap_or_else(|error| panic!("{error}"));
     }
@@ -92,30 +80,21 @@ pub(crate) fn scene_edit_seeds() -> Vec<Vec<u8>> {
 }
 
 /// A workbench file; nothing that it names is opened.
-pub(crate) fn workbench_toml(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
+pub(crate) fn workbench_toml(text: &str) {
     if let Err(error) = Workbench::parse("fuzz.toml", text, Path::new(NOWHERE)) {
         assert!(!error.to_string().is_empty());
     }
 }
 
 /// The geometry of a string-driven device.
-pub(crate) fn string_geometry(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
+pub(crate) fn string_geometry(text: &str) {
     if let Err(error) = Geometry::parse("fuzz.toml", text) {
         assert!(!error.problems.is_empty());
     }
 }
 
 /// A device trace as `taut replay` reads it: finite, in order.
-pub(crate) fn trace_csv(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
+pub(crate) fn trace_csv(text: &str) {
     if let Ok(trace) = DeviceTrace::parse("fuzz.csv", text) {
         let samples = trace.samples();
         assert!(!samples.is_empty());

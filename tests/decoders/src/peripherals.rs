@@ -17,18 +17,21 @@ const MAX_CHUNKS: usize = 64;
 /// Name of the device in the samples.
 const DEVICE: &str = "Tracker0";
 
-/// A server's stream, cut into chunks whose size is the first byte, and then the same bytes as a datagram.
+/// A stream, and its chunks: their size is the first byte.
+fn stream(bytes: &[u8]) -> Option<(&[u8], std::slice::Chunks<'_, u8>)> {
+    let (size, stream) = bytes.split_first()?;
+    let size = usize::from(*size).max(stream.len() / MAX_CHUNKS + 1);
+    Some((stream, stream.chunks(size)))
+}
+
+/// A server's stream in chunks, and then the same bytes as a datagram.
 pub(crate) fn vrpn_client(bytes: &[u8]) {
-    let Some((chunk, stream)) = bytes.split_first() else {
+    let Some((stream, mut chunks)) = stream(bytes) else {
         return;
     };
     let at = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 3883);
     let mut client = Client::new(DEVICE, Some(at));
-    let size = usize::from(*chunk).max(stream.len() / MAX_CHUNKS + 1);
-    let broken = stream
-        .chunks(size)
-        .any(|chunk| client.receive(chunk).is_err());
-    if !broken {
+    if !chunks.any(|chunk| client.receive(chunk).is_err()) {
         client.receive_datagram(stream);
         client.ping(Stamp::default());
     }
@@ -46,16 +49,11 @@ pub(crate) fn vrpn_client(bytes: &[u8]) {
 
 /// A client's stream to a VRPN server, cut as in [`vrpn_client`], and then as a datagram that asks to be dialled.
 pub(crate) fn vrpn_server(bytes: &[u8]) {
-    let Some((chunk, stream)) = bytes.split_first() else {
+    let Some((stream, mut chunks)) = stream(bytes) else {
         return;
     };
     let mut session = ServerSession::new(DEVICE, Ipv4Addr::LOCALHOST);
-    let size = usize::from(*chunk).max(stream.len() / MAX_CHUNKS + 1);
-    for chunk in stream.chunks(size) {
-        if session.receive(chunk, Stamp::default()).is_err() {
-            break;
-        }
-    }
+    let _ = chunks.any(|chunk| session.receive(chunk, Stamp::default()).is_err());
     assert!(session.pending().len() <= 2 * MAX_PENDING_BYTES);
     let mut datagram = Vec::new();
     let _ = session.take_datagram(&mut datagram);

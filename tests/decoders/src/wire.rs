@@ -168,29 +168,28 @@ pub(crate) fn datagram_seeds() -> Vec<Vec<u8>> {
 
 /// Opened golden datagrams, their kind's code in front.
 pub(crate) fn payload_seeds() -> Vec<Vec<u8>> {
-    let mut opener = golden_opener();
-    let mut seeds = Vec::new();
-    for datagram in golden("datagram/") {
-        if let Ok(opened) = opener.open(&datagram) {
+    opened()
+        .filter_map(|(code, payload)| {
             let mut seed = vec![0; 2 * MAX_PAYLOAD_BYTES];
-            seed[0] = datagram[3];
-            if let Ok(length) = opened.payload.encode_into(&mut seed[1..]) {
-                seed.truncate(1 + length);
-                seeds.push(seed);
-            }
-        }
-    }
-    seeds
+            seed[0] = code;
+            let length = payload.encode_into(&mut seed[1..]).ok()?;
+            seed.truncate(1 + length);
+            Some(seed)
+        })
+        .collect()
+}
+
+/// What the golden datagrams carry, with the codes of their kinds.
+fn opened() -> impl Iterator<Item = (u8, Payload)> {
+    let mut opener = golden_opener();
+    let opened = move |datagram: Vec<u8>| Some((datagram[3], opener.open(&datagram).ok()?.payload));
+    golden("datagram/").into_iter().filter_map(opened)
 }
 
 pub(crate) fn part_seeds() -> Vec<Vec<u8>> {
-    let mut opener = golden_opener();
     let mut seeds = Vec::new();
-    for datagram in golden("datagram/") {
-        let Ok(opened) = opener.open(&datagram) else {
-            continue;
-        };
-        let Payload::Constraints(part) = opened.payload else {
+    for (_, payload) in opened() {
+        let Payload::Constraints(part) = payload else {
             continue;
         };
         let first = ConstraintPart {
