@@ -63,88 +63,24 @@ pub struct Section {
 }
 
 /// All parts, in the order of the table.
-pub const SECTIONS: &[Section] = &[
-    Section {
-        name: "latency",
-        about: "one-way latency, sealed UDP and QUIC datagrams beside raw UDP",
-        run: latency_rows,
-    },
-    Section {
-        name: "skew",
-        about: "frames of two and four nodes: swap skew, pose age, equality",
-        run: skew_rows,
-    },
-    Section {
-        name: "loss",
-        about: "pose age behind a network that loses, beside one that does not",
-        run: loss_rows,
-    },
-    Section {
-        name: "events",
-        about: "discrete events behind a network that loses",
-        run: events_rows,
-    },
-    Section {
-        name: "isolation",
-        about: "period of the haptics loop without and with eight clients, stalled and flooding ones included",
-        run: isolation_rows,
-    },
-    Section {
-        name: "scale",
-        about: "processor time for each state and client, 8 to 64 clients",
-        run: scale_rows,
-    },
-    Section {
-        name: "forged",
-        about: "forged, replayed, truncated and damaged datagrams",
-        run: forged_rows,
-    },
-    Section {
-        name: "join",
-        about: "time to join a scene of 10 MB",
-        run: join_rows,
-    },
-    Section {
-        name: "death",
-        about: "a node that is killed or stopped, and the others",
-        run: death_rows,
-    },
-    Section {
-        name: "screens",
-        about: "a node that draws is killed or stopped, and the others",
-        run: screen_death_rows,
-    },
-    Section {
-        name: "server",
-        about: "the server is killed while a hand feels a force",
-        run: server_kill_rows,
-    },
-    Section {
-        name: "failover",
-        about: "the server is killed, and the nodes go on together",
-        run: failover_rows,
-    },
-    Section {
-        name: "soak",
-        about: "hours in which clients of the links come, go and are killed",
-        run: super::soak::of_links,
-    },
-    Section {
-        name: "soak-program",
-        about: "hours in which nodes, observers, server and bridge come, go and are killed",
-        run: super::soak::of_program,
-    },
-    Section {
-        name: "hostile",
-        about: "one attack for each promise",
-        run: crate::hostile::rows,
-    },
-    Section {
-        name: "elsewhere",
-        about: "what is not measured here",
-        run: elsewhere,
-    },
-];
+pub const SECTIONS: &[Section] = sections! {
+    "latency": latency_rows, "one-way latency, sealed UDP and QUIC datagrams beside raw UDP";
+    "skew": skew_rows, "frames of two and four nodes: swap skew, pose age, equality";
+    "loss": loss_rows, "pose age behind a network that loses, beside one that does not";
+    "events": events_rows, "discrete events behind a network that loses";
+    "isolation": isolation_rows, "period of the haptics loop without and with eight clients, stalled and flooding ones included";
+    "scale": scale_rows, "processor time for each state and client, 8 to 64 clients";
+    "forged": forged_rows, "forged, replayed, truncated and damaged datagrams";
+    "join": join_rows, "time to join a scene of 10 MB";
+    "death": death_rows, "a node that is killed or stopped, and the others";
+    "screens": screen_death_rows, "a node that draws is killed or stopped, and the others";
+    "server": server_kill_rows, "the server is killed while a hand feels a force";
+    "failover": failover_rows, "the server is killed, and the nodes go on together";
+    "soak": super::soak::of_links, "hours in which clients of the links come, go and are killed";
+    "soak-program": super::soak::of_program, "hours in which nodes, observers, server and bridge come, go and are killed";
+    "hostile": crate::hostile::rows, "one attack for each promise";
+    "elsewhere": elsewhere, "what is not measured here";
+};
 
 fn latency_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     let mut rows = Vec::new();
