@@ -1,7 +1,7 @@
 //! One sample of every datagram payload and control message, and strategies that vary them: a file per family.
 
 use taut_proto::{
-    Payload,
+    DecodeError, Payload,
     header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
     seal::Sealer,
 };
@@ -35,6 +35,15 @@ mod values;
 #[track_caller]
 pub fn must<T, E: std::fmt::Display>(result: Result<T, E>) -> T {
     result.unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The number that is out of its range.
+#[track_caller]
+pub fn refused<T: std::fmt::Debug>(result: Result<T, DecodeError>) -> &'static str {
+    match result {
+        Err(DecodeError::OutOfRange { number, .. }) => number,
+        other => panic!("not refused: {other:?}"),
+    }
 }
 
 pub fn bytes_of(payload: &Payload) -> Vec<u8> {
