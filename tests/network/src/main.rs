@@ -10,7 +10,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use taut_link::Transport;
 use taut_network_tests::bench::scale::Place;
 use taut_network_tests::bench::{client_process, leader_process, node};
 use taut_network_tests::report::{Extent, Row, SECTIONS, Section, Verdict, csv, table};
@@ -69,10 +68,7 @@ fn one_node(words: &[String]) -> Run {
     let [server, node, transport, key, seconds] = words else {
         return Err("--node takes SERVER NODE udp|quic KEY SECONDS".into());
     };
-    let transport = match transport.as_str() {
-        "quic" => Transport::QuicDatagram,
-        _ => Transport::Udp,
-    };
+    let transport = client_process::transport_of(transport);
     let seconds = Duration::from_secs_f64(positive(seconds)?);
     let got = node::run(server, node, transport, key.as_ref(), seconds)?;
     println!(

@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use taut_link::{ClusterKey, Role, connect, serve};
+use taut_link::{ClusterKey, Role, connect};
 use taut_network_tests::bench::{
-    age, client_options, server_options, small_content, state, wait_until,
+    age, client_options, serve_behind, server_options, state, wait_until,
 };
-use taut_network_tests::relay::{Burst, Direction, Impairment, Treatment, Waiting};
+use taut_network_tests::relay::{Burst, Direction, Impairment, Treatment};
 
 /// Further age that the target allows, ms.
 const TARGET_MS: f64 = 2.0;
@@ -50,15 +50,13 @@ fn after_a_burst_the_next_state_is_the_right_one() {
 fn a_black_hole_ends_and_states_come_again_in_the_same_session() {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     let key = ClusterKey::generate().expect("a key");
-    let waiting = Waiting::bind().unwrap_or_else(|error| panic!("{error}"));
-    let mut options = server_options(&key);
-    options.announced_udp_port = Some(waiting.address().port());
-    let server = runtime
-        .block_on(serve(options, small_content()))
-        .unwrap_or_else(|error| panic!("{error}"));
-    let relay = waiting
-        .start(server.udp_addr(), vec![Treatment::default()], 3)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let served = serve_behind(
+        &runtime,
+        server_options(&key),
+        vec![Treatment::default()],
+        3,
+    );
+    let (server, relay) = served.unwrap_or_else(|error| panic!("{error}"));
     let client = runtime
         .block_on(connect(client_options(&server, &key, Role::Render, "left")))
         .unwrap_or_else(|error| panic!("{error}"));

@@ -1,10 +1,10 @@
 //! Forged, replayed, truncated and damaged datagrams: none is accepted, and none hinders a genuine one.
 
 use std::net::UdpSocket;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use taut_link::{ClientLink, ClientOptions, ClusterKey, Counters, Role, ServerLink};
-use taut_network_tests::bench::{BenchError, reading, serve_behind, server_options};
+use taut_network_tests::bench::{BenchError, reading, serve_behind, server_options, wait_until};
 use taut_network_tests::forge::{
     Attack, FORGERIES, Forger, Forgery, MAX_FORGED_BYTES, Seen, attack, payload_of_every_kind,
 };
@@ -44,15 +44,6 @@ fn every_sort_of_forgery_differs_from_what_is_coming() {
             let length = forger.forge(forgery, &seen, &payloads[0], &mut buffer);
             assert_ne!(buffer[..length], seen.coming, "{forgery:?}");
         }
-    }
-}
-
-/// Waits without a limit that a loaded machine would miss.
-fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !done() {
-        assert!(start.elapsed() < PATIENCE, "{what}: did not happen");
-        std::thread::sleep(Duration::from_millis(1));
     }
 }
 
@@ -121,13 +112,13 @@ impl Session {
         wait_until("the inputs", || {
             let counters = server.counters();
             counters.inputs + counters.inputs_late == 50
-        });
+        })?;
         relay.set_black_hole(true);
         wait_until("quiet", || {
             let counts = relay.counts(Direction::Up);
             counts.passed + counts.swallowed == counts.received
                 && server.counters().packets_received == counts.passed
-        });
+        })?;
         Ok(Self {
             bridge,
             relay,
@@ -152,15 +143,15 @@ impl Session {
 }
 
 #[test]
-fn a_servers_counters_account_for_each_of_100000_forgeries() {
+fn a_servers_counters_account_for_each_of_100000_forgeries() -> Result<(), BenchError> {
     /// Sent before the server is waited for: fewer than its socket holds.
     const AT_A_TIME: u64 = 50;
     const FORGERIES_SENT: u64 = 100_000;
-    let session = Session::silenced().unwrap_or_else(|error| panic!("{error}"));
+    let session = Session::silenced()?;
     let server = &session.server;
     let (seen, mut forger) = session.stolen();
     let payloads = payload_of_every_kind();
-    let thief = UdpSocket::bind("127.0.0.1:0").expect("a socket");
+    let thief = UdpSocket::bind("127.0.0.1:0")?;
     let before = server.counters();
     let path = server.clients()[0].udp_address;
     let (mut due, mut buffer) = (Due::default(), [0; MAX_FORGED_BYTES]);
@@ -169,13 +160,11 @@ fn a_servers_counters_account_for_each_of_100000_forgeries() {
         let payload = &payloads[number as usize / FORGERIES.len() % payloads.len()];
         let length = forger.forge(forgery, &seen, payload, &mut buffer);
         due.count(&buffer[..length]);
-        thief
-            .send_to(&buffer[..length], server.udp_addr())
-            .expect("loopback takes it");
+        thief.send_to(&buffer[..length], server.udp_addr())?;
         if number % AT_A_TIME == AT_A_TIME - 1 {
             wait_until("counting", || {
                 Due::counted(&before, &server.counters()) == due
-            });
+            })?;
         }
     }
     assert_eq!(
@@ -202,7 +191,8 @@ fn a_servers_counters_account_for_each_of_100000_forgeries() {
     session.relay.set_black_hole(false);
     wait_until("a genuine datagram", || {
         server.counters().packets_received > before.packets_received
-    });
+    })?;
     assert!(FORGERIES.contains(&Forgery::Replayed));
     assert_eq!(session.bridge.is_closed(), None);
+    Ok(())
 }

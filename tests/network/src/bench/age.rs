@@ -11,8 +11,8 @@ use tokio::runtime::Runtime;
 
 use super::threads::{on_own_thread, runtime};
 use super::{
-    BenchError, Quantiles, Ticker, client_options, request_fifo, serve_behind, server_options,
-    state, wait_until,
+    BenchError, Quantiles, Ticker, client_options, paths, request_fifo, serve_behind,
+    server_options, state, wait_until,
 };
 use crate::relay::{Direction, Impairment, RelayCounts, Treatment};
 
@@ -126,10 +126,7 @@ fn connect_in_turn(
     for node in ["control", "impaired"] {
         let options = client_options(server, key, Role::Render, node);
         clients.push(runtime.block_on(connect(options))?);
-        wait_until("the path to open", || {
-            let clients = server.clients();
-            clients.iter().all(|client| client.udp_address.is_some())
-        })?;
+        wait_until("the path to open", || paths(server) == clients.len())?;
     }
     Ok(clients)
 }

@@ -13,6 +13,14 @@ use super::process::Process;
 /// Longest wait for the server.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// `quic`, or else UDP.
+pub fn transport_of(word: &str) -> Transport {
+    match word {
+        "quic" => Transport::QuicDatagram,
+        _ => Transport::Udp,
+    }
+}
+
 /// Joins as a render node.
 pub(super) fn member(
     runtime: &Runtime,
@@ -79,11 +87,7 @@ pub(super) fn states_and_lost(client: &mut Process) -> Result<[u64; 2], BenchErr
 pub fn client(server: &str, node: &str, transport: &str, key: &Path) -> Result<(), BenchError> {
     let runtime = Runtime::new()?;
     let key = taut_link::read_key_file(key)?;
-    let transport = match transport {
-        "quic" => Transport::QuicDatagram,
-        _ => Transport::Udp,
-    };
-    let link = member(&runtime, server, &key, node, transport)?;
+    let link = member(&runtime, server, &key, node, transport_of(transport))?;
     println!("joined");
     for line in std::io::stdin().lines() {
         line?;

@@ -4,12 +4,12 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
-use taut_link::{ClusterKey, LinkEvent, Role, ServerOptions, connect, serve};
+use taut_link::{ClusterKey, LinkEvent, Role, ServerOptions, serve};
 
 use super::client_process::start_client;
 use super::state_stream::StateStream;
 use super::threads::{on_own_thread, runtime};
-use super::{BenchError, client_options, request_fifo, small_content, wait_until};
+use super::{BenchError, enter, paths, request_fifo, small_content, wait_until};
 
 /// Real-time priority of server and witness, where the system grants it.
 const PRIORITY: u8 = 70;
@@ -60,22 +60,10 @@ fn measure_here(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
     let _ = request_fifo(PRIORITY);
     let runtime = runtime(2)?;
     let server = runtime.block_on(serve(ServerOptions::loopback(key.clone()), small_content()))?;
-    let witness = runtime.block_on(connect(client_options(
-        &server,
-        &key,
-        Role::Render,
-        "witness",
-    )))?;
+    let witness = enter(&runtime, &server, &key, Role::Render, "witness")?;
     let address = server.quic_addr().to_string();
     let victim = start_client(this, &address, &path, VICTIM, "udp")?;
-    wait_until("both paths", || {
-        server
-            .clients()
-            .iter()
-            .filter(|client| client.udp_address.is_some())
-            .count()
-            == 2
-    })?;
+    wait_until("both paths", || paths(&server) == 2)?;
     let stream = StateStream::start(&server)?;
     std::thread::sleep(Duration::from_millis(500));
     while server.try_event().is_some() {}

@@ -7,7 +7,7 @@
 use std::net::UdpSocket;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use taut_bridge::OwnThread;
@@ -17,7 +17,8 @@ use tokio::runtime::Runtime;
 
 use super::client_process::{member, start_client};
 use super::process::Process;
-use super::program::{Served, Workbench, set};
+use super::program::{Served, Workbench, number, set};
+use super::threads::on_own_thread;
 use super::{BenchError, reading, request_fifo};
 
 /// Time that a stalled client stands still, again and again.
@@ -116,7 +117,6 @@ fn run(
     std::thread::sleep(duration);
     let flooded = crowd.map_or(Ok(0), Crowd::leave)?;
     let report = served.stop()?;
-    let number = |value: &serde_json::Value| value.as_f64().unwrap_or(f64::NAN);
     let period = &report["haptics_period_us"];
     let period = Period {
         p50: number(&period["p50"]),
@@ -142,16 +142,9 @@ fn run(
 /// silence. The program, started before, does not inherit it.
 fn awake(workbench: &Workbench, served: &Served, this: &Path) -> Result<Crowd, BenchError> {
     const PRIORITY: u8 = 1;
-    std::thread::scope(|scope| {
-        let joined = std::thread::Builder::new()
-            .name("crowd".to_owned())
-            .spawn_scoped(scope, || {
-                let _ = request_fifo(PRIORITY);
-                Crowd::join(workbench, served, this)
-            })?;
-        joined
-            .join()
-            .unwrap_or_else(|_| Err(BenchError::Missing("a client panicked".to_owned())))
+    on_own_thread("crowd", || {
+        let _ = request_fifo(PRIORITY);
+        Crowd::join(workbench, served, this)
     })
 }
 
@@ -160,9 +153,8 @@ struct Crowd {
     runtime: Runtime,
     readers: Vec<taut_link::ClientLink>,
     stalled: Vec<Stalled>,
-    stop: Arc<AtomicBool>,
     flooded: Arc<AtomicU64>,
-    floods: Vec<std::thread::JoinHandle<()>>,
+    floods: [OwnThread; 2],
 }
 
 impl Crowd {
@@ -188,10 +180,7 @@ impl Crowd {
                 transport,
             )?);
         }
-        let (stop, flooded) = (
-            Arc::new(AtomicBool::new(false)),
-            Arc::new(AtomicU64::new(0)),
-        );
+        let flooded = Arc::new(AtomicU64::new(0));
         let flooder = member(&runtime, &served.quic, &key, "flooder", Transport::Udp)?;
         let mut index = 0;
         let from_inside = move || {
@@ -209,15 +198,14 @@ impl Crowd {
         let from_outside = move || {
             let _ = socket.send(&datagram);
         };
-        let floods = vec![
-            flood("flood-inside", from_inside, &stop, &flooded)?,
-            flood("flood-outside", from_outside, &stop, &flooded)?,
+        let floods = [
+            flood("flood-inside", from_inside, &flooded)?,
+            flood("flood-outside", from_outside, &flooded)?,
         ];
         Ok(Crowd {
             runtime,
             readers,
             stalled,
-            stop,
             flooded,
             floods,
         })
@@ -225,16 +213,11 @@ impl Crowd {
 
     /// Ends the floods, lets everybody go; how many datagrams were flooded.
     fn leave(self) -> Result<u64, BenchError> {
-        self.stop.store(true, Ordering::Relaxed);
-        for thread in self.floods {
-            let ended = thread.join();
-            ended.map_err(|_| BenchError::Missing("a flood panicked".to_owned()))?;
-        }
+        drop(self.floods);
         for reader in &self.readers {
             if let Some(reason) = reader.is_closed() {
-                return Err(BenchError::Missing(format!(
-                    "a client was thrown out: {reason}"
-                )));
+                let what = format!("a client was thrown out: {reason}");
+                return Err(BenchError::Missing(what));
             }
         }
         drop(self.stalled);
@@ -248,13 +231,12 @@ impl Crowd {
 fn flood(
     name: &str,
     mut send: impl FnMut() + Send + 'static,
-    stop: &Arc<AtomicBool>,
     count: &Arc<AtomicU64>,
-) -> Result<std::thread::JoinHandle<()>, BenchError> {
-    let (stop, count) = (stop.clone(), count.clone());
-    let run = move || {
+) -> std::io::Result<OwnThread> {
+    let count = count.clone();
+    OwnThread::start(name, move |stopped| {
         let (start, mut sent) = (Instant::now(), 0);
-        while !stop.load(Ordering::Relaxed) {
+        while !stopped.load(Ordering::Relaxed) {
             let due = (start.elapsed().as_secs_f64() * f64::from(FLOOD_HZ)) as u64;
             // What a busy machine made late is not made up for at once.
             let batch = (due - sent).min(u64::from(FLOOD_HZ) / 10);
@@ -263,10 +245,7 @@ fn flood(
             sent = due;
             std::thread::sleep(FLOOD_STEP);
         }
-    };
-    Ok(std::thread::Builder::new()
-        .name(name.to_owned())
-        .spawn(run)?)
+    })
 }
 
 /// A client process that is stopped most of the time.

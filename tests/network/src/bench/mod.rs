@@ -35,3 +35,5 @@ pub use session::{
     BenchError, client_options, content_with, reading, serve_behind, server_options, small_content,
     state, wait_until,
 };
+pub(crate) use session::{enter, free_group, paths};
+pub(crate) use threads::runtime;

@@ -3,13 +3,12 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use taut_link::{ClientOptions, Role, Transport, connect};
+use taut_link::Transport;
 use tokio::runtime::Runtime;
 
+use super::client_process::member;
 use super::{BenchError, Quantiles};
 
-/// Longest wait for the server.
-const PATIENCE: Duration = Duration::from_secs(30);
 /// Time between two looks at what came.
 const LOOK: Duration = Duration::from_millis(5);
 
@@ -41,13 +40,9 @@ pub fn run(
     duration: Duration,
 ) -> Result<Got, BenchError> {
     let runtime = Runtime::new()?;
-    let options = ClientOptions {
-        transport,
-        connect_timeout: PATIENCE,
-        ..ClientOptions::new(server, taut_link::read_key_file(key)?, Role::Render, node)
-    };
+    let key = taut_link::read_key_file(key)?;
     let start = Instant::now();
-    let link = runtime.block_on(connect(options))?;
+    let link = member(&runtime, server, &key, node, transport)?;
     let joined_s = start.elapsed().as_secs_f64();
     let (mut states, mut latencies) = (Vec::new(), Vec::new());
     let (mut count, mut disordered, mut newest) = (0, 0, 0);
@@ -55,9 +50,8 @@ pub fn run(
     while start.elapsed() < duration {
         std::thread::sleep(LOOK);
         if let Some(reason) = link.is_closed() {
-            return Err(BenchError::Missing(format!(
-                "{node} was thrown out: {reason}"
-            )));
+            let what = format!("{node} was thrown out: {reason}");
+            return Err(BenchError::Missing(what));
         }
         link.drain_states(&mut states);
         for received in states.drain(..) {

@@ -43,7 +43,7 @@ impl Process {
         let errors = self.child.stderr.take();
         errors
             .map(BufReader::new)
-            .ok_or_else(|| BenchError::Missing("the program has no standard error".to_owned()))
+            .ok_or_else(|| BenchError::missing("the program has no standard error"))
     }
 
     /// Its number.

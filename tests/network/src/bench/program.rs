@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use taut_link::{ClusterKey, create_key_file};
+use taut_scene::Scene;
 use tempfile::TempDir;
 use toml::{Table, Value};
 
@@ -16,7 +17,7 @@ use super::process::Process;
 /// The workbench file that is shipped.
 const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml");
 /// The scene of all runs.
-pub(crate) const SCENE: &str = "sphere-on-plane";
+const SCENE: &str = "sphere-on-plane";
 
 /// Lines of a server that are kept.
 const MOST_LINES: usize = 10_000;
@@ -65,11 +66,14 @@ impl Workbench {
         self.directory.path().join(name)
     }
 
-    /// Writes a file into its directory; where.
-    pub(crate) fn write(&self, name: &str, content: &str) -> Result<PathBuf, BenchError> {
-        let path = self.path(name);
-        std::fs::write(&path, content)?;
-        Ok(path)
+    /// A file of the scene's own hand; where.
+    pub(crate) fn write_hand(&self) -> Result<String, BenchError> {
+        let hand = Scene::named_or_file(SCENE).and_then(|scene| scene.hand_path());
+        let hand = hand.map_err(BenchError::missing)?;
+        let hand = hand.ok_or_else(|| BenchError::missing("the scene has no hand"))?;
+        let path = self.path("hand.csv");
+        std::fs::write(&path, hand.to_csv())?;
+        Ok(path.display().to_string())
     }
 
     /// Starts `taut serve`, at these addresses or at free ones, and waits until it serves.
@@ -177,6 +181,11 @@ pub(crate) fn remote_device(file: &mut Table) {
     file.insert("device".to_owned(), remote.into());
 }
 
+/// A number of a report; NaN where there is none.
+pub(crate) fn number(value: &serde_json::Value) -> f64 {
+    value.as_f64().unwrap_or(f64::NAN)
+}
+
 /// Changes a value of a workbench file, such as `network.quic_port`.
 pub(crate) fn set(file: &mut Table, key: &str, value: impl Into<Value>) -> Result<(), BenchError> {
     let (table, key) = key.split_once('.').ok_or_else(broken)?;
@@ -188,7 +197,7 @@ pub(crate) fn set(file: &mut Table, key: &str, value: impl Into<Value>) -> Resul
 }
 
 fn broken() -> BenchError {
-    BenchError::Missing("the shipped workbench file is not as it was".to_owned())
+    BenchError::missing("the shipped workbench file is not as it was")
 }
 
 /// A running `taut serve`; killed when dropped.

@@ -21,7 +21,7 @@ use taut_proto::seal::{KEY_MATERIAL_BYTES, Sealer};
 use super::client_process::{start_client_by, states_and_lost};
 use super::process::Process;
 use super::threads::{on_own_thread, runtime};
-use super::{BenchError, server_options, small_content, state, wait_until};
+use super::{BenchError, paths, server_options, small_content, state, wait_until};
 
 /// Places that are kept for device, tracker and operator.
 const OTHERS: usize = 3;
@@ -110,8 +110,7 @@ pub fn ways(receivers: usize) -> Result<Ways, BenchError> {
             }
         }
         let mut payload = [0; MAX_PAYLOAD_BYTES];
-        let length = encode_into(&state(1, 1, true), &mut payload)
-            .map_err(|error| BenchError::Missing(error.to_string()))?;
+        let length = encode_into(&state(1, 1, true), &mut payload).map_err(BenchError::missing)?;
         let sealers: Vec<Sealer> = (0..receivers)
             .map(|k| Sealer::new(&[k as u8; KEY_MATERIAL_BYTES], 1, 0))
             .collect();
@@ -237,14 +236,7 @@ pub fn cost(
             start_client_by(this, &address, &key_path, &format!("node-{k}"), "udp")
         })
         .collect::<Result<Vec<_>, _>>()?;
-    wait_until("datagrams of all", || {
-        server
-            .clients()
-            .iter()
-            .filter(|c| c.udp_address.is_some())
-            .count()
-            == clients
-    })?;
+    wait_until("datagrams of all", || paths(&server) == clients)?;
     let cost = on_own_thread("broadcast", || {
         broadcast(&server, &mut processes, group.is_some(), seconds)
     });

@@ -12,6 +12,7 @@ use taut_link::{
 use tokio::runtime::Runtime;
 
 use super::BenchError;
+use super::threads::joined;
 
 /// Drawing time: shortest and longest, us.
 const DRAW_US: (u64, u64) = (3000, 7000);
@@ -33,17 +34,23 @@ pub struct Swapped {
     pub sessions: u64,
 }
 
+/// How far a node is.
+#[derive(Default)]
+struct Progress {
+    stop: AtomicBool,
+    /// Sessions that it has taken over.
+    sessions: AtomicU64,
+    /// Number of the one that it has.
+    session: AtomicU64,
+    /// Number of the newest frame.
+    frame: AtomicU64,
+    /// Frames that it has shown.
+    shown: AtomicU64,
+}
+
 /// The node; ends when dropped.
 pub struct Screen {
-    stop: Arc<AtomicBool>,
-    /// Sessions that it has taken over.
-    sessions: Arc<AtomicU64>,
-    /// Number of the one that it has.
-    session: Arc<AtomicU64>,
-    /// Number of the newest frame.
-    frame: Arc<AtomicU64>,
-    /// Frames that it has shown.
-    shown: Arc<AtomicU64>,
+    progress: Arc<Progress>,
     link: Arc<ClientLink>,
     thread: Option<JoinHandle<Vec<Swapped>>>,
 }
@@ -59,31 +66,25 @@ impl Screen {
         let prepare = |_: Arc<ClientLink>| async { Ok::<(), LinkError>(()) };
         let joined = SupervisedLink::join(options, RejoinPolicy::default(), prepare);
         let (supervised, link, ()) = runtime.block_on(joined)?;
-        let mut screen = Screen {
-            stop: Arc::default(),
-            sessions: Arc::new(AtomicU64::new(1)),
-            session: Arc::new(AtomicU64::new(link.session().into())),
-            frame: Arc::default(),
-            shown: Arc::default(),
-            link: link.clone(),
-            thread: None,
-        };
+        let progress = Arc::new(Progress {
+            sessions: AtomicU64::new(1),
+            session: AtomicU64::new(link.session().into()),
+            ..Progress::default()
+        });
         let mut drawing = Drawing {
             supervised,
-            link,
+            link: link.clone(),
             random: seed,
-            stop: screen.stop.clone(),
-            sessions: screen.sessions.clone(),
-            session: screen.session.clone(),
-            frame: screen.frame.clone(),
-            count: screen.shown.clone(),
+            progress: progress.clone(),
         };
-        screen.thread = Some(
-            std::thread::Builder::new()
-                .name(name)
-                .spawn(move || drawing.run())?,
-        );
-        Ok(screen)
+        let thread = std::thread::Builder::new()
+            .name(name)
+            .spawn(move || drawing.run())?;
+        Ok(Screen {
+            progress,
+            link,
+            thread: Some(thread),
+        })
     }
 
     /// Its first session.
@@ -93,37 +94,35 @@ impl Screen {
 
     /// Sessions that it has taken over, the first included.
     pub fn sessions(&self) -> u64 {
-        self.sessions.load(Ordering::Relaxed)
+        self.progress.sessions.load(Ordering::Relaxed)
     }
 
     /// Number of the session that it has: of nodes without a server the lowest leads.
     pub fn session(&self) -> u64 {
-        self.session.load(Ordering::Relaxed)
+        self.progress.session.load(Ordering::Relaxed)
     }
 
     /// Number of the newest frame that it showed.
     pub fn frame(&self) -> u64 {
-        self.frame.load(Ordering::Relaxed)
+        self.progress.frame.load(Ordering::Relaxed)
     }
 
     /// How many frames it has shown.
     pub fn shown(&self) -> u64 {
-        self.shown.load(Ordering::Relaxed)
+        self.progress.shown.load(Ordering::Relaxed)
     }
 
     /// Ends it without a word to anybody; what it showed.
     pub fn end(mut self) -> Result<Vec<Swapped>, BenchError> {
-        self.stop.store(true, Ordering::Relaxed);
-        let shown = self.thread.take().map(JoinHandle::join);
-        shown
-            .and_then(Result::ok)
-            .ok_or_else(|| BenchError::Missing("a node panicked".to_owned()))
+        self.progress.stop.store(true, Ordering::Relaxed);
+        let thread = self.thread.take();
+        joined(thread.ok_or_else(|| BenchError::missing("the node has ended"))?)
     }
 }
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
+        self.progress.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join(); // it was given up already
         }
@@ -134,25 +133,22 @@ struct Drawing {
     supervised: SupervisedLink<()>,
     link: Arc<ClientLink>,
     random: u64,
-    stop: Arc<AtomicBool>,
-    sessions: Arc<AtomicU64>,
-    session: Arc<AtomicU64>,
-    frame: Arc<AtomicU64>,
-    count: Arc<AtomicU64>,
+    progress: Arc<Progress>,
 }
 
 impl Drawing {
     fn run(&mut self) -> Vec<Swapped> {
         let mut shown = Vec::with_capacity(1 << 16);
         let mut gate = self.link.frame_gate(Duration::ZERO);
-        while !self.stop.load(Ordering::Relaxed) {
+        let progress = self.progress.clone();
+        while !progress.stop.load(Ordering::Relaxed) {
             match self.supervised.take_renewal() {
                 Some(Renewal::Session { link, .. }) => {
                     self.link = link;
                     gate = self.link.frame_gate(Duration::ZERO);
                     let number = self.link.session();
-                    self.session.store(number.into(), Ordering::Relaxed);
-                    self.sessions.fetch_add(1, Ordering::Relaxed);
+                    progress.session.store(number.into(), Ordering::Relaxed);
+                    progress.sessions.fetch_add(1, Ordering::Relaxed);
                 }
                 Some(Renewal::Ended(_)) => break,
                 None => {}
@@ -166,14 +162,14 @@ impl Drawing {
             if gate.wait().is_some() {
                 let at = Instant::now();
                 gate.swapped(at);
-                self.frame.store(released.frame, Ordering::Relaxed);
-                self.count.fetch_add(1, Ordering::Relaxed);
+                progress.frame.store(released.frame, Ordering::Relaxed);
+                progress.shown.fetch_add(1, Ordering::Relaxed);
                 shown.push(Swapped {
                     frame: released.frame,
                     at,
                     sample_ns: released.state.sample_time_ns,
                     state_hash: released.state_hash,
-                    sessions: self.sessions.load(Ordering::Relaxed),
+                    sessions: progress.sessions.load(Ordering::Relaxed),
                 });
             }
         }

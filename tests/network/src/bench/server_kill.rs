@@ -5,10 +5,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use taut_link::{ClientOptions, ReceivedState, Role};
-use taut_scene::Scene;
-use toml::{Table, Value};
 
-use super::program::{SCENE, Workbench};
+use super::program::{Workbench, number, remote_device};
 use super::screen::Screen;
 use super::threads::runtime;
 use super::{BenchError, wait_until};
@@ -37,18 +35,13 @@ pub struct ServerKill {
 
 /// Runs it once with `program`.
 pub fn measure(program: &Path) -> Result<ServerKill, BenchError> {
-    let remote = Table::from_iter([("kind".to_owned(), Value::from("remote"))]);
     let workbench = Workbench::new(program, |file| {
-        file.insert("device".to_owned(), remote.into());
+        remote_device(file);
         Ok(())
     })?;
     let server = workbench.serve(None)?;
     let (quic, udp) = (server.quic.clone(), server.udp.clone());
-    let hand = Scene::named_or_file(SCENE).and_then(|scene| scene.hand_path());
-    let hand = hand.map_err(|error| BenchError::Missing(error.to_string()))?;
-    let hand = hand.ok_or_else(|| BenchError::Missing("the scene has no hand".to_owned()))?;
-    let path = workbench.write("hand.csv", &hand.to_csv())?;
-    let path = path.display().to_string();
+    let path = workbench.write_hand()?;
     let arguments = ["--json", "--hand", "firm", "--path", &path, "--loop"];
     let bridge = workbench.join("bridge", "bridge", &quic, &arguments)?;
 
@@ -79,7 +72,6 @@ pub fn measure(program: &Path) -> Result<ServerKill, BenchError> {
     drop(screens);
     let report = bridge.report()?;
     drop(again);
-    let number = |value: &serde_json::Value| value.as_f64().unwrap_or(f64::NAN);
     Ok(ServerKill {
         oldest_force_ms: number(&report["max_force_age_ms"]),
         longest_period_ms: number(&report["period_us"]["max"]) * 1e-3,

@@ -1,9 +1,11 @@
 //! A small server and clients of it, for measuring.
 
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::{Duration, Instant};
 
 use taut_link::{
-    ClientOptions, ClusterKey, Content, LinkError, Role, ServerLink, ServerOptions, serve,
+    ClientLink, ClientOptions, ClusterKey, Content, LinkError, Role, ServerLink, ServerOptions,
+    connect, serve,
 };
 use taut_proto::{
     HotState, InputSample, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
@@ -38,6 +40,13 @@ pub enum BenchError {
     Missing(String),
 }
 
+impl BenchError {
+    /// For what has no kind of its own.
+    pub(crate) fn missing(what: impl std::fmt::Display) -> BenchError {
+        BenchError::Missing(what.to_string())
+    }
+}
+
 /// A server on free ports of 127.0.0.1 that forgives a busy machine.
 pub fn server_options(key: &ClusterKey) -> ServerOptions {
     ServerOptions {
@@ -59,6 +68,17 @@ pub fn client_options(
         connect_timeout: FORGIVING,
         ..ClientOptions::new(server.quic_addr().to_string(), key.clone(), role, node)
     }
+}
+
+/// A client of `server` that has joined.
+pub(crate) fn enter(
+    runtime: &Runtime,
+    server: &ServerLink,
+    key: &ClusterKey,
+    role: Role,
+    node: &str,
+) -> Result<ClientLink, LinkError> {
+    runtime.block_on(connect(client_options(server, key, role, node)))
 }
 
 /// A server of one triangle behind a relay: clients are told to send their datagrams to the relay.
@@ -158,6 +178,21 @@ pub fn state(tick: u64, sample_time_ns: u64, full: bool) -> HotState {
             .collect();
     }
     state
+}
+
+/// A group that nobody else speaks to, and a port of `interface` that is free.
+pub(crate) fn free_group(interface: Ipv4Addr) -> Result<SocketAddrV4, BenchError> {
+    let port = UdpSocket::bind((interface, 0))?.local_addr()?.port();
+    let [high, low] = port.to_be_bytes();
+    Ok(SocketAddrV4::new(Ipv4Addr::new(239, 255, high, low), port))
+}
+
+/// Clients whose datagrams have opened a path.
+pub(crate) fn paths(server: &ServerLink) -> usize {
+    let clients = server.clients().into_iter();
+    clients
+        .filter(|client| client.udp_address.is_some())
+        .count()
 }
 
 /// Waits for a condition.

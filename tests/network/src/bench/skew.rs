@@ -14,7 +14,7 @@ use taut_proto::barrier::{MasterSettings, Swap};
 
 use super::screen::{Screen, Swapped, together};
 use super::state_stream::StateStream;
-use super::threads::{on_own_thread, runtime};
+use super::threads::{joined, on_own_thread, runtime};
 use super::{
     BenchError, Quantiles, Ticker, client_options, keep_cores_awake, request_fifo, small_content,
 };
@@ -134,7 +134,7 @@ fn measure_here(plan: Plan, fifo: bool) -> Result<Skew, BenchError> {
     std::thread::sleep(plan.duration);
     let report = server
         .frame_report()
-        .ok_or_else(|| BenchError::Missing("nobody leads".to_owned()))?;
+        .ok_or_else(|| BenchError::missing("nobody leads"))?;
     let shown: Vec<_> = screens
         .into_iter()
         .map(Screen::end)
@@ -181,7 +181,7 @@ impl Leading {
     pub fn start(server: &ServerLink) -> Result<Leading, BenchError> {
         let mut master = server
             .frame_master()
-            .ok_or_else(|| BenchError::Missing("the server leads no frames".to_owned()))?;
+            .ok_or_else(|| BenchError::missing("the server leads no frames"))?;
         let stop = Arc::new(AtomicBool::new(false));
         let over = stop.clone();
         let states = StateStream::start(server)?;
@@ -199,8 +199,7 @@ impl Leading {
     pub fn end(self) -> Result<(), BenchError> {
         self.stop.store(true, Ordering::Relaxed);
         self.states.end()?;
-        let ended = self.frames.join();
-        ended.map_err(|_| BenchError::Missing("the leading thread panicked".to_owned()))
+        joined(self.frames)
     }
 }
 
@@ -236,8 +235,7 @@ fn control(plan: Plan) -> Result<Vec<f64>, BenchError> {
     }
     let mut woken = Vec::new();
     for thread in threads {
-        let joined = thread.join();
-        woken.push(joined.map_err(|_| BenchError::Missing("a control panicked".to_owned()))?);
+        woken.push(joined(thread)?);
     }
     let skew = |round: usize| {
         let at = || woken.iter().map(|of: &Vec<f64>| of[round]);

@@ -17,7 +17,7 @@ use taut_proto::state::{EventRecord, event_code};
 use tokio::runtime::Runtime;
 
 use super::soak_log::SoakLog;
-use super::threads::runtime;
+use super::threads::{joined, runtime};
 use super::{BenchError, Ticker, memory, serve_behind, server_options, state, wait_until};
 use crate::forge::{FORGERIES, Forger, MAX_FORGED_BYTES, Seen, payload_of_every_kind};
 use crate::random::Random;
@@ -115,8 +115,7 @@ pub fn run(duration: Duration, seed: u64, log: &mut SoakLog) -> Result<Soak, Ben
         crowd.rest()
     })();
     stop.store(true, Ordering::Relaxed);
-    let sent = attack.join();
-    let sent = sent.map_err(|_| BenchError::Missing("the sending thread panicked".to_owned()))?;
+    let sent = joined(attack)?;
     run?;
     let mut result = crowd.result;
     (result.states, result.forged) = sent?;

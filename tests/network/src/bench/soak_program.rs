@@ -12,12 +12,10 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use serde_json::Value as Json;
 use taut_link::{ClientOptions, Role};
-use taut_scene::Scene;
 
 use super::process::Process;
-use super::program::{SCENE, Served, Workbench, remote_device, set};
+use super::program::{Served, Workbench, number, remote_device, set};
 use super::soak_log::SoakLog;
 use super::soak_watcher::{Restarts, Watcher};
 use super::{BenchError, wait_until};
@@ -110,14 +108,10 @@ impl Cast {
             set(file, "observers.enabled", true)?;
             set(file, "observers.port", i64::from(http.port()))
         })?;
-        let hand = Scene::named_or_file(SCENE).and_then(|scene| scene.hand_path());
-        let hand = hand.map_err(|error| BenchError::Missing(error.to_string()))?;
-        let hand = hand.ok_or_else(|| BenchError::Missing("the scene has no hand".to_owned()))?;
-        let hand = workbench.write("hand.csv", &hand.to_csv())?;
         let server = workbench.serve(None)?;
         let (tell, broken) = mpsc::channel();
         let mut cast = Cast {
-            hand: hand.display().to_string(),
+            hand: workbench.write_hand()?,
             quic: server.quic.clone(),
             udp: server.udp.clone(),
             http: http.to_string(),
@@ -304,10 +298,6 @@ fn observe(address: &str) -> Result<TcpStream, BenchError> {
     Ok(stream)
 }
 
-fn number(value: &Json) -> f64 {
-    value.as_f64().unwrap_or(f64::NAN)
-}
-
 fn nobody() -> BenchError {
-    BenchError::Missing("a process of the soak is not there".to_owned())
+    BenchError::missing("a process of the soak is not there")
 }

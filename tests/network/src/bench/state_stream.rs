@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use taut_link::ServerLink;
 
+use super::threads::joined;
 use super::{BenchError, Ticker, state};
 
 /// The stream while it is not ended; it goes on where this is dropped.
@@ -36,7 +37,6 @@ impl StateStream {
     /// Ends it; an error where its thread panicked.
     pub(super) fn end(self) -> Result<(), BenchError> {
         self.stop.store(true, Ordering::Relaxed);
-        let ended = self.thread.join();
-        ended.map_err(|_| BenchError::Missing("the sending thread panicked".to_owned()))
+        joined(self.thread)
     }
 }

@@ -1,5 +1,7 @@
 //! Where a measurement runs: a thread of its own, whose class is not its caller's, and the runtime of its links.
 
+use std::thread::JoinHandle;
+
 use tokio::runtime::Runtime;
 
 use super::BenchError;
@@ -19,8 +21,15 @@ pub(super) fn on_own_thread<T: Send>(
     })
 }
 
+/// What a thread ended with.
+pub(super) fn joined<T>(thread: JoinHandle<T>) -> Result<T, BenchError> {
+    let name = thread.thread().name().unwrap_or_default().to_owned();
+    let panicked = |_| BenchError::Missing(format!("the thread `{name}` panicked"));
+    thread.join().map_err(panicked)
+}
+
 /// A runtime for links with so many threads.
-pub(super) fn runtime(threads: usize) -> Result<Runtime, BenchError> {
+pub(crate) fn runtime(threads: usize) -> Result<Runtime, BenchError> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(threads)
         .enable_all()

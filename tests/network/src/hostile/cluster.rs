@@ -1,23 +1,26 @@
 //! Frames, members of the group, numbers out of range.
 
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddrV4};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use taut_link::proto::barrier::{Arrive, MAX_MEMBERS, MOST_TERMS_AHEAD, MasterSettings, Swap};
+use taut_link::proto::barrier::{Arrive, MAX_MEMBERS, MOST_TERMS_AHEAD, Swap};
 use taut_link::proto::events::EventAck;
 use taut_link::proto::header::MAX_DATAGRAM_BYTES;
 use taut_link::proto::state::RunState;
 use taut_link::proto::{Group, Holder, JoinKey, Payload, confirmation};
 use taut_link::{
     ClientLink, ClusterKey, FrameReport, FrameTurn, LinkError, LinkEvent, MulticastOptions,
-    ReceivedState, Role, ServerLink, ServerOptions, connect, serve,
+    ReceivedState, Role, ServerLink, ServerOptions, serve,
 };
 use tokio::runtime::Runtime;
 
 use super::liar::{Liar, multicast_works, to_groups};
 use super::{Attack, Finding};
-use crate::bench::{BenchError, client_options, server_options, small_content, state, wait_until};
+use crate::bench::skew::settings;
+use crate::bench::{
+    BenchError, enter, free_group, runtime, server_options, small_content, state, wait_until,
+};
 use crate::report::Extent;
 
 /// The attacks of this group.
@@ -50,17 +53,18 @@ pub(super) const ATTACKS: &[Attack] = &[
 
 const FRAME: Duration = Duration::from_nanos(16_666_667);
 
-fn runtime() -> Result<Runtime, BenchError> {
-    let mut builder = tokio::runtime::Builder::new_multi_thread();
-    Ok(builder.worker_threads(1).enable_all().build()?)
-}
-
-fn frames() -> Option<MasterSettings> {
-    Some(MasterSettings {
-        swap: Swap::Immediate,
-        period_ns: FRAME.as_nanos() as u64,
-        slowest_ns: 100_000_000,
-    })
+/// A server that keeps sixty frames a second together.
+fn serve_frames(
+    runtime: &Runtime,
+    key: &ClusterKey,
+    max_clients: usize,
+) -> Result<ServerLink, BenchError> {
+    let options = ServerOptions {
+        frames: Some(settings(Swap::Immediate, 60)),
+        max_clients,
+        ..server_options(key)
+    };
+    Ok(runtime.block_on(serve(options, small_content()))?)
 }
 
 fn report(server: &ServerLink) -> FrameReport {
@@ -133,16 +137,11 @@ fn draw(screen: &ClientLink, period: Duration, over: &AtomicBool) {
 }
 
 fn one_too_many(_: &Extent) -> Result<Finding, BenchError> {
-    let (runtime, key) = (runtime()?, ClusterKey::generate()?);
-    let options = ServerOptions {
-        frames: frames(),
-        max_clients: 2 * MAX_MEMBERS,
-        ..server_options(&key)
-    };
-    let server = runtime.block_on(serve(options, small_content()))?;
+    let (runtime, key) = (runtime(1)?, ClusterKey::generate()?);
+    let server = serve_frames(&runtime, &key, 2 * MAX_MEMBERS)?;
     let join = |number: usize| {
         let node = format!("node{number}");
-        runtime.block_on(connect(client_options(&server, &key, Role::Render, &node)))
+        enter(&runtime, &server, &key, Role::Render, &node)
     };
     let mut inside = Vec::new();
     for number in 0..MAX_MEMBERS {
@@ -169,14 +168,9 @@ fn one_too_many(_: &Extent) -> Result<Finding, BenchError> {
 }
 
 fn slow_node(_: &Extent) -> Result<Finding, BenchError> {
-    let runtime = runtime()?;
-    let key = ClusterKey::generate()?;
-    let options = ServerOptions {
-        frames: frames(),
-        ..server_options(&key)
-    };
-    let server = runtime.block_on(serve(options, small_content()))?;
-    let join = |node| runtime.block_on(connect(client_options(&server, &key, Role::Render, node)));
+    let (runtime, key) = (runtime(1)?, ClusterKey::generate()?);
+    let server = serve_frames(&runtime, &key, MAX_MEMBERS)?;
+    let join = |node| enter(&runtime, &server, &key, Role::Render, node);
     let (left, right, slow) = (join("left")?, join("right")?, join("slow")?);
     let screens = [
         (&left, FRAME / 2),
@@ -210,15 +204,9 @@ fn slow_node(_: &Extent) -> Result<Finding, BenchError> {
 }
 
 fn last_term(_: &Extent) -> Result<Finding, BenchError> {
-    let runtime = runtime()?;
-    let key = ClusterKey::generate()?;
-    let options = ServerOptions {
-        frames: frames(),
-        ..server_options(&key)
-    };
-    let server = runtime.block_on(serve(options, small_content()))?;
-    let options = client_options(&server, &key, Role::Render, "left");
-    let left = runtime.block_on(connect(options))?;
+    let (runtime, key) = (runtime(1)?, ClusterKey::generate()?);
+    let server = serve_frames(&runtime, &key, MAX_MEMBERS)?;
+    let left = enter(&runtime, &server, &key, Role::Render, "left")?;
     let key = credential(&key, Role::Render, "liar");
     let liar = runtime.block_on(Liar::join(&server, &key, Role::Render, "liar"))?;
     while_serving(&server, &[(&left, FRAME / 2)], || {
@@ -268,14 +256,6 @@ fn last_term(_: &Extent) -> Result<Finding, BenchError> {
     })
 }
 
-/// A free group on loopback.
-fn free_group() -> Result<SocketAddrV4, BenchError> {
-    let port = UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port();
-    let [high, low] = port.to_be_bytes();
-    let group = Ipv4Addr::new(239, 255, high, low);
-    Ok(SocketAddrV4::new(group, port))
-}
-
 /// What came of forged states.
 #[derive(Default)]
 struct Forging {
@@ -314,7 +294,7 @@ impl Forging {
             }
             let mut buffer = [0; MAX_DATAGRAM_BYTES];
             let datagram = sealer.seal(&Payload::Hot(forged), u64::MAX / 4, &mut buffer);
-            let datagram = datagram.map_err(|error| BenchError::Missing(error.to_string()))?;
+            let datagram = datagram.map_err(BenchError::missing)?;
             socket.send_to(datagram, &address.into())?;
             forging.sent += 1;
             std::thread::sleep(Duration::from_millis(2));
@@ -324,9 +304,7 @@ impl Forging {
             let mut drawn = states.iter().filter(is_forged);
             forging.drawn += drawn.clone().count();
             if drawn.any(|state| state.of_server().is_some()) {
-                return Err(BenchError::Missing(
-                    "a forged state counts as the server's".into(),
-                ));
+                return Err(BenchError::missing("a forged state counts as the server's"));
             }
             if screen.states_withdrawn() > forging.alarms_before {
                 forging.found = Some(begun.elapsed());
@@ -357,27 +335,24 @@ impl Forging {
 }
 
 fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
-    let group = free_group()?;
+    let group = free_group(Ipv4Addr::LOCALHOST)?;
     if !multicast_works(group) {
         return Ok(Finding {
             happened: "not measured: this system gives no multicast on loopback".to_owned(),
             kept: true,
         });
     }
-    let runtime = runtime()?;
-    let key = ClusterKey::generate()?;
-    let multicast = MulticastOptions {
-        group,
-        announced: None,
-        interface: Ipv4Addr::LOCALHOST,
-    };
+    let (runtime, key) = (runtime(1)?, ClusterKey::generate()?);
     let options = ServerOptions {
-        multicast: Some(multicast),
+        multicast: Some(MulticastOptions {
+            group,
+            announced: None,
+            interface: Ipv4Addr::LOCALHOST,
+        }),
         ..server_options(&key)
     };
     let server = runtime.block_on(serve(options, small_content()))?;
-    let options = client_options(&server, &key, Role::Render, "screen");
-    let screen = runtime.block_on(connect(options))?;
+    let screen = enter(&runtime, &server, &key, Role::Render, "screen")?;
     let observer = credential(&key, Role::Observer, "liar");
     let mut liar = runtime.block_on(Liar::join(&server, &observer, Role::Observer, "liar"))?;
     let known = runtime.block_on(liar.group_with("screen"))?;

@@ -39,10 +39,6 @@ const UPDATES: usize = 500;
 /// Most that a hand may be given that paid nothing, J; free of charge it would be 12.5 mJ.
 const MOST_GIVEN: f64 = 1e-3;
 
-fn missing(what: impl std::fmt::Display) -> BenchError {
-    BenchError::Missing(what.to_string())
-}
-
 /// The shipped sphere, pressed onto its plane, and the constraint set there.
 struct Resting {
     world: Arc<World>,
@@ -52,18 +48,18 @@ struct Resting {
 
 impl Resting {
     fn new() -> Result<Resting, BenchError> {
-        let scene = Scene::named_or_file("sphere-on-plane").map_err(missing)?;
-        let built = scene.build().map_err(missing)?;
+        let scene = Scene::named_or_file("sphere-on-plane").map_err(BenchError::missing)?;
+        let built = scene.build().map_err(BenchError::missing)?;
         let world = Arc::new(built.world);
-        let mut sphere =
-            GodObject::new(Arc::clone(&world), built.settings, built.start).map_err(missing)?;
+        let mut sphere = GodObject::new(Arc::clone(&world), built.settings, built.start)
+            .map_err(BenchError::missing)?;
         let below = Pose::translation(0.0, 0.0, -0.1) * built.start;
         for _ in 0..UPDATES {
             sphere.step(&below, None);
         }
         let set = sphere.constraint_set().clone();
         if set.constraints.is_empty() {
-            return Err(missing("the sphere lies on nothing"));
+            return Err(BenchError::missing("the sphere lies on nothing"));
         }
         Ok(Resting {
             world,
@@ -120,14 +116,15 @@ fn settings_at_the_edge(_: &Extent) -> Result<Finding, BenchError> {
     let (mut same, mut felt) = (0, 0);
     for _ in 0..DRAWS {
         let settings = drawn(&mut random);
-        let offer = offer_of(&resting.world, &settings, [], 1000.0).map_err(missing)?;
+        let offer = offer_of(&resting.world, &settings, [], 1000.0).map_err(BenchError::missing)?;
         let offer = ControlMessage::Coupling(offer);
-        let frame = offer.to_frame().map_err(missing)?;
-        let came = ControlMessage::from_frame_body(&frame[LENGTH_BYTES..]).map_err(missing)?;
+        let frame = offer.to_frame().map_err(BenchError::missing)?;
+        let came =
+            ControlMessage::from_frame_body(&frame[LENGTH_BYTES..]).map_err(BenchError::missing)?;
         let ControlMessage::Coupling(CouplingOffer::AtEdge(came)) = came else {
-            return Err(missing("the server computes the force itself"));
+            return Err(BenchError::missing("the server computes the force itself"));
         };
-        let (its_world, its_settings) = world_of(&came).map_err(missing)?;
+        let (its_world, its_settings) = world_of(&came).map_err(BenchError::missing)?;
         let here = forces(&resting, &resting.world, &settings);
         let there = forces(&resting, &its_world, &its_settings);
         same += usize::from(here == there && its_settings == settings);

@@ -6,15 +6,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use taut_link::pinning::PinnedServer;
-use taut_link::{
-    ClientLink, ClusterKey, Role, ServerLink, ServerOptions, connect, serve, transport,
-};
+use taut_link::{ClusterKey, Role, ServerLink, ServerOptions, connect, serve, transport};
 use taut_proto::VersionRange;
-use tokio::runtime::Runtime;
 
 use super::{Attack, Finding};
 use crate::bench::{
-    BenchError, Ticker, client_options, reading, request_fifo, server_options, small_content, state,
+    BenchError, Ticker, client_options, enter, reading, request_fifo, runtime, server_options,
+    small_content, state,
 };
 use crate::report::Extent;
 
@@ -68,28 +66,14 @@ const STEERED_STATES: u64 = 400;
 const CHALLENGE_BYTES: u64 = 24 + 8 + 16;
 const MILLISECOND: Duration = Duration::from_millis(1);
 
-fn runtime() -> Result<Runtime, BenchError> {
-    runtime_of(2)
-}
-
-fn runtime_of(threads: usize) -> Result<Runtime, BenchError> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(threads)
-        .enable_all()
-        .build();
-    Ok(runtime?)
-}
-
 fn full_house(_: &Extent) -> Result<Finding, BenchError> {
-    let (runtime, key) = (runtime()?, ClusterKey::generate()?);
+    let (runtime, key) = (runtime(2)?, ClusterKey::generate()?);
     let options = ServerOptions {
         max_clients: MAX_CLIENTS,
         ..server_options(&key)
     };
     let server = runtime.block_on(serve(options, small_content()))?;
-    let join = |role, node: &str| -> Result<ClientLink, taut_link::LinkError> {
-        runtime.block_on(connect(client_options(&server, &key, role, node)))
-    };
+    let join = |role, node: &str| enter(&runtime, &server, &key, role, node);
     let mut inside = Vec::new();
     while let Ok(link) = join(Role::Observer, &format!("watcher-{}", inside.len())) {
         inside.push(link);
@@ -151,10 +135,10 @@ async fn hold(from: Ipv4Addr, server: SocketAddr, key: ClusterKey) {
 }
 
 fn silent_joins(_: &Extent) -> Result<Finding, BenchError> {
-    let (runtime, key) = (runtime()?, ClusterKey::generate()?);
-    let server = runtime.block_on(serve(server_options(&key), small_content()))?;
     // On threads of their own: what their handshakes cost them is not taken from server and device.
-    let others = runtime_of(1)?;
+    let others = runtime(1)?;
+    let (runtime, key) = (runtime(2)?, ClusterKey::generate()?);
+    let server = runtime.block_on(serve(server_options(&key), small_content()))?;
     for host in 2..6 {
         let from = Ipv4Addr::new(127, 0, 0, host);
         others.spawn(hold(from, server.quic_addr(), key.clone()));
@@ -165,12 +149,7 @@ fn silent_joins(_: &Extent) -> Result<Finding, BenchError> {
         std::thread::sleep(MILLISECOND);
     }
     let start = Instant::now();
-    let joined = runtime.block_on(connect(client_options(
-        &server,
-        &key,
-        Role::Device,
-        "bridge",
-    )));
+    let joined = enter(&runtime, &server, &key, Role::Device, "bridge");
     let took = start.elapsed();
     let counters = server.counters();
     Ok(Finding {
@@ -197,7 +176,7 @@ fn first_packets_to(server: &ServerLink) -> Result<Vec<Vec<u8>>, BenchError> {
     let mut packets = Vec::new();
     for _ in 0..DIFFERENT_PACKETS {
         let joining = endpoint.connect_with(config.clone(), heard.local_addr()?, "taut");
-        let joining = joining.map_err(|error| BenchError::Missing(error.to_string()))?;
+        let joining = joining.map_err(BenchError::missing)?;
         let mut packet = vec![0; 2048];
         let length = heard.recv(&mut packet)?;
         packet.truncate(length);
@@ -208,9 +187,9 @@ fn first_packets_to(server: &ServerLink) -> Result<Vec<Vec<u8>>, BenchError> {
 }
 
 fn first_packets(_: &Extent) -> Result<Finding, BenchError> {
-    let (runtime, key) = (runtime()?, ClusterKey::generate()?);
+    let (runtime, key) = (runtime(2)?, ClusterKey::generate()?);
     let server = runtime.block_on(serve(server_options(&key), small_content()))?;
-    let join = |role, node| runtime.block_on(connect(client_options(&server, &key, role, node)));
+    let join = |role, node| enter(&runtime, &server, &key, role, node);
     let device = join(Role::Device, "bridge")?;
     let packets = {
         let _within = runtime.enter();
@@ -252,7 +231,7 @@ fn first_packets(_: &Extent) -> Result<Finding, BenchError> {
         is_over.store(true, Ordering::Relaxed);
         (readings.join(), node)
     });
-    let sent = sent.map_err(|_| BenchError::Missing("the device broke down".to_owned()))?;
+    let sent = sent.map_err(|_| BenchError::missing("the device broke down"))?;
     let taken = || {
         let counters = server.counters();
         counters.inputs + counters.inputs_late
@@ -320,14 +299,14 @@ impl Middle {
 }
 
 fn steered_path(_: &Extent) -> Result<Finding, BenchError> {
-    let (runtime, key) = (runtime()?, ClusterKey::generate()?);
+    let (runtime, key) = (runtime(2)?, ClusterKey::generate()?);
     let mut middle = Middle::new()?;
     let options = ServerOptions {
         announced_udp_port: Some(middle.door.local_addr()?.port()),
         ..server_options(&key)
     };
     let server = runtime.block_on(serve(options, small_content()))?;
-    let client = runtime.block_on(connect(client_options(&server, &key, Role::Render, "left")))?;
+    let client = enter(&runtime, &server, &key, Role::Render, "left")?;
     let mut broadcaster = server.broadcaster();
     let (mut tick, mut states, mut before) = (0, Vec::new(), 0);
     let end = Instant::now() + Duration::from_secs(10);
@@ -359,7 +338,7 @@ fn steered_path(_: &Extent) -> Result<Finding, BenchError> {
 }
 
 fn other_release(_: &Extent) -> Result<Finding, BenchError> {
-    let (runtime, key) = (runtime()?, ClusterKey::generate()?);
+    let (runtime, key) = (runtime(2)?, ClusterKey::generate()?);
     let server = runtime.block_on(serve(server_options(&key), small_content()))?;
     let newer = VersionRange::SUPPORTED.max().saturating_add(1);
     let mut options = client_options(&server, &key, Role::Render, "left");

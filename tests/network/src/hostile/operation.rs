@@ -8,12 +8,12 @@ use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
 use taut_link::proto::control::LogLevel;
-use taut_link::{ClusterKey, LinkError, LinkEvent, Role, connect, serve};
+use taut_link::{ClusterKey, LinkError, LinkEvent, Role, serve};
 use taut_observers::{Hello, StreamServer, StreamSettings, state_channel};
 use tokio::runtime::Runtime;
 
 use super::{Attack, Finding};
-use crate::bench::{BenchError, client_options, server_options, small_content, wait_until};
+use crate::bench::{BenchError, enter, server_options, small_content, wait_until};
 use crate::report::Extent;
 
 /// The attacks of this group.
@@ -96,27 +96,14 @@ fn text_from_outside(_: &Extent) -> Result<Finding, BenchError> {
     let (runtime, key) = (Runtime::new()?, ClusterKey::generate()?);
     let server = runtime.block_on(serve(server_options(&key), small_content()))?;
     // Rightly inside but for its name; then under a fair name, with lines that are not.
-    let named = runtime.block_on(connect(client_options(
-        &server,
-        &key,
-        Role::Operator,
-        HOSTILE,
-    )));
-    let answer = match named {
+    let answer = match enter(&runtime, &server, &key, Role::Operator, HOSTILE) {
         Err(error @ LinkError::Refused { .. }) => error.to_string(),
         other => {
-            return Err(BenchError::Missing(format!(
-                "a name of control sequences was taken: {:?}",
-                other.err()
-            )));
+            let what = format!("a name of control sequences was taken: {:?}", other.err());
+            return Err(BenchError::Missing(what));
         }
     };
-    let client = runtime.block_on(connect(client_options(
-        &server,
-        &key,
-        Role::Operator,
-        "alice",
-    )))?;
+    let client = enter(&runtime, &server, &key, Role::Operator, "alice")?;
     client.post_log(LogLevel::Error, HOSTILE.to_owned());
     let (mut shown, mut refused, mut logged) = (vec![answer], false, false);
     wait_until("the refusal and the line", || {
@@ -188,7 +175,7 @@ fn page_from_elsewhere(_: &Extent) -> Result<Finding, BenchError> {
     })
 }
 
-fn get(address: SocketAddr, target: &str, headers: &str) -> std::io::Result<String> {
+pub(super) fn get(address: SocketAddr, target: &str, headers: &str) -> std::io::Result<String> {
     let mut stream = TcpStream::connect(address)?;
     stream.set_read_timeout(Some(Duration::from_secs(30)))?;
     write!(

@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
-use taut::shared::failure::Failure;
 use taut_bridge::{BridgeArgs, BridgeReport, CouplingChoice, HandPreset};
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 use taut_test_kit::BALL_ON_FLOOR;
@@ -130,7 +129,7 @@ fn run(coupling: CouplingChoice, treatment: Treatment) -> Result<BridgeReport, B
     };
     let (scene, path) = (file("scene.toml", BALL_ON_FLOOR)?, file("path.csv", PATH)?);
     let key_path = folder.path().join("key");
-    let key = taut_link::create_key_file(&key_path).map_err(missing)?;
+    let key = taut_link::create_key_file(&key_path).map_err(BenchError::missing)?;
     let wanted = [
         "network.quic_port=0",
         "network.udp_port=0",
@@ -142,27 +141,23 @@ fn run(coupling: CouplingChoice, treatment: Treatment) -> Result<BridgeReport, B
         Path::new(""),
         &wanted,
     )
-    .map_err(missing)?;
+    .map_err(BenchError::missing)?;
     let overrides = Overrides {
         scene: scene.to_str().map(str::to_owned),
         no_monitor: true,
         ..Overrides::default()
     };
-    let mut setup = session_setup(&workbench, key, &overrides).map_err(failed)?;
+    let mut setup = session_setup(&workbench, key, &overrides).map_err(BenchError::missing)?;
     let waiting = Waiting::bind()?;
     setup.link.announced_udp_port = Some(waiting.address().port());
-    let mut session = Session::start(setup).map_err(failed)?;
+    let mut session = Session::start(setup).map_err(BenchError::missing)?;
     let (Some(quic), Some(udp)) = (session.quic_address(), session.udp_address()) else {
-        return Err(BenchError::Missing(
-            "the session does not listen".to_owned(),
-        ));
+        return Err(BenchError::missing("the session does not listen"));
     };
     let relay = waiting.start(udp, vec![treatment], 3)?;
 
     let Some(mut args) = BridgeArgs::joining(&quic.to_string(), "hand") else {
-        return Err(BenchError::Missing(
-            "the bridge takes no arguments".to_owned(),
-        ));
+        return Err(BenchError::missing("the bridge takes no arguments"));
     };
     args.key = Some(key_path);
     args.path = Some(path);
@@ -171,20 +166,12 @@ fn run(coupling: CouplingChoice, treatment: Treatment) -> Result<BridgeReport, B
     args.duration = Some(DURATION);
     args.coupling = Some(coupling);
     args.priority = 0;
-    let report = taut_bridge::run(&args).map_err(missing);
+    let report = taut_bridge::run(&args).map_err(BenchError::missing);
     drop(relay);
     session.follow_network();
     let (_, failure) = session.stop();
     match failure {
-        Some(failure) => Err(failed(failure)),
+        Some(failure) => Err(BenchError::missing(failure)),
         None => report,
     }
-}
-
-fn missing(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Missing(error.to_string())
-}
-
-fn failed(failure: Failure) -> BenchError {
-    missing(failure)
 }

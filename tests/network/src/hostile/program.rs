@@ -4,8 +4,8 @@
 //! device's own wire is seen. How fast a force falls is asked in `device-bridge/tests/ends.rs`.
 
 use std::fs::File;
-use std::io::{PipeReader, PipeWriter, Read, Write, pipe};
-use std::net::{TcpListener, TcpStream};
+use std::io::{PipeReader, PipeWriter, Write, pipe};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::Stdio;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -22,6 +22,7 @@ use taut_link::proto::state::event_code::safety_of;
 use taut_link::{ClientLink, ClientOptions, ClusterKey, ReceivedState, Role, connect};
 use tokio::runtime::Runtime;
 
+use super::operation::get;
 use super::{Attack, Finding};
 use crate::bench::process::Process;
 use crate::bench::program::{Served, Workbench, remote_device, set};
@@ -122,7 +123,7 @@ impl Pressing {
             pose: Pose::translation(0.0, 0.0, z),
         };
         let path = vec![via(0.0, 0.0), via(DOWN_S, DEEP)];
-        let path = MinJerkPath::new(path, false).map_err(missing)?;
+        let path = MinJerkPath::new(path, false).map_err(BenchError::missing)?;
         let arm = SimulatedWooden::new(WOODEN_MODELS[0], Hand::FIRM, Some(path), None).waiting();
         let socket = workbench.path("board");
         // The board has a processor of its own; where the system refuses that, it shares this one.
@@ -133,7 +134,7 @@ impl Pressing {
             });
             started
                 .join()
-                .map_err(|_| missing("the board's thread broke down"))
+                .map_err(|_| BenchError::missing("the board's thread broke down"))
         })??;
         let device = format!("wooden={},scale=4", socket.display());
         let words = ["--device", &device, "--rearm", "automatic", "--stay"];
@@ -179,10 +180,6 @@ fn says(client: &ClientLink, given: bool) -> Result<(), BenchError> {
         let mut own = states.iter().filter_map(ReceivedState::of_server);
         own.any(|state| (state.run() == RunState::Running) == given)
     })
-}
-
-fn missing(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Missing(error.to_string())
 }
 
 fn every_end(extent: &Extent) -> Result<Finding, BenchError> {
@@ -375,7 +372,8 @@ fn silent_observers(extent: &Extent) -> Result<Finding, BenchError> {
         set(file, "observers.port", i64::from(port))
     })?;
     let server = workbench.serve(None)?;
-    let address = format!("127.0.0.1:{port}");
+    let address = SocketAddr::from(([127, 0, 0, 1], port));
+    let host = format!("Host: {address}");
     let rate = |answer: &str| -> Option<f64> {
         let mut lines = answer.lines();
         let rate = lines.find_map(|line| line.strip_prefix("taut_haptics_rate_hertz "));
@@ -384,9 +382,10 @@ fn silent_observers(extent: &Extent) -> Result<Finding, BenchError> {
     let mut rates = Vec::new();
     for _ in 0..SILENT_TURNS {
         let silent: std::io::Result<Vec<_>> =
-            (0..SILENT).map(|_| TcpStream::connect(&address)).collect();
+            (0..SILENT).map(|_| TcpStream::connect(address)).collect();
         wait_until("metrics", || {
-            let got = metrics(&address).ok().and_then(|answer| rate(&answer));
+            let answer = get(address, "/metrics", &host).ok();
+            let got = answer.and_then(|answer| rate(&answer));
             rates.extend(got);
             got.is_some()
         })?;
@@ -400,13 +399,4 @@ fn silent_observers(extent: &Extent) -> Result<Finding, BenchError> {
         ),
         kept: rates.len() == SILENT_TURNS && report["haptics_hz"].as_f64() > Some(0.0),
     })
-}
-
-fn metrics(address: &str) -> std::io::Result<String> {
-    let mut stream = TcpStream::connect(address)?;
-    stream.set_read_timeout(Some(Duration::from_secs(5)))?;
-    write!(stream, "GET /metrics HTTP/1.1\r\nHost: {address}\r\n\r\n")?;
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer)?;
-    Ok(answer)
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use taut_proto::barrier::Swap;
 
-use super::row::{Row, brief};
+use super::row::{Row, brief, worst};
 use super::sections::Extent;
 use crate::bench::failover::{self, Failover};
 use crate::bench::skew::{self, OverTurns, Plan, Skew, Turns};
@@ -158,10 +158,6 @@ pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     for _ in 0..extent.deaths.min(3) {
         runs.push(failover::measure(&extent.this, extent.node_timeout)?);
     }
-    let worst = |of: fn(&Failover) -> f64| {
-        let values = runs.iter().map(of);
-        values.max_by(f64::total_cmp).unwrap_or(f64::NAN)
-    };
     let fifo = runs.iter().all(|run| run.fifo);
     let setting = format!(
         "largest of {}, {} nodes at {} Hz, {}",
@@ -178,26 +174,26 @@ pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     Ok(vec![
         row(
             "SIGKILL of the server: longest time between two swaps",
-            worst(|run| run.gap_ms),
+            worst(&runs, |run| run.gap_ms),
             FAILOVER_MS,
             "ms",
         ),
         row(
             "death of the node that leads then: longest time between two swaps",
-            worst(|run| run.second_gap_ms),
+            worst(&runs, |run| run.second_gap_ms),
             FAILOVER_MS,
             "ms",
         ),
         skew_of_leader(&runs, &setting),
         row(
             "nodes back, from the start of the next server's process",
-            worst(|run| run.back_s),
+            worst(&runs, |run| run.back_s),
             2.0,
             "s",
         ),
         row(
             "longest time between two swaps around that return",
-            worst(|run| run.return_gap_ms),
+            worst(&runs, |run| run.return_gap_ms),
             FAILOVER_MS,
             "ms",
         ),

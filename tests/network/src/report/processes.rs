@@ -1,6 +1,6 @@
 //! Rows of whole processes of `taut` that die: the server with a hand at its device, and a node that draws.
 
-use super::row::Row;
+use super::row::{Row, worst};
 use super::sections::Extent;
 use crate::bench::death::Death;
 use crate::bench::{BenchError, screen_death, server_kill};
@@ -26,10 +26,6 @@ pub(super) fn server_kill_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> 
     for _ in 0..extent.deaths.min(3) {
         runs.push(server_kill::measure(&extent.program)?);
     }
-    let worst = |of: fn(&server_kill::ServerKill) -> f64| {
-        let values = runs.iter().map(of);
-        values.max_by(f64::total_cmp).unwrap_or(f64::NAN)
-    };
     let times = format!("largest of {}", runs.len());
     let sessions = runs
         .iter()
@@ -38,20 +34,20 @@ pub(super) fn server_kill_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> 
     Ok(vec![
         Row::at_most(
             format!("{measure}: nodes joined again, from its next start"),
-            worst(|run| run.back_s),
+            worst(&runs, |run| run.back_s),
             2.0,
             "s",
             &times,
         ),
         Row::at_most(
             format!("{measure}: oldest force at the device"),
-            worst(|run| run.oldest_force_ms),
+            worst(&runs, |run| run.oldest_force_ms),
             120.0,
             "ms",
             format!(
                 "{times}; forces up to {:.1} N, longest period of the bridge's loop {:.1} ms",
-                worst(|run| run.largest_force_n),
-                worst(|run| run.longest_period_ms)
+                worst(&runs, |run| run.largest_force_n),
+                worst(&runs, |run| run.longest_period_ms)
             ),
         ),
         Row::invariant(
@@ -76,40 +72,41 @@ pub(super) fn screen_death_rows(extent: &Extent) -> Result<Vec<Row>, BenchError>
         for _ in 0..extent.deaths.min(3) {
             runs.push(screen_death::measure(&extent.program, death)?);
         }
-        let worst = |of: fn(&screen_death::ScreenDeath) -> f64| {
-            let values = runs.iter().map(of);
-            values.max_by(f64::total_cmp).unwrap_or(f64::NAN)
-        };
         let times = format!("largest of {}", runs.len());
         rows.push(Row::at_most(
             format!("{signal} {measure}: others' longest time between two swaps"),
-            worst(|run| run.longest_gap_frames),
+            worst(&runs, |run| run.longest_gap_frames),
             3.0,
             "frames",
             format!(
                 "{times}, {} Hz, without a graphics card; {:.2} before the death",
                 screen_death::RATE,
-                worst(|run| run.control_gap_frames)
+                worst(&runs, |run| run.control_gap_frames)
             ),
-        ));
-        rows.push(Row::at_most(
-            format!("{signal} {measure}: let go by the server"),
-            worst(|run| run.let_go_s * 1e3),
-            600.0,
-            "ms",
-            &times,
         ));
         let since = match death {
             Death::Killed => "from the start of its process",
             Death::Stopped => "from its going on",
         };
-        rows.push(Row::at_most(
-            format!("{signal} {measure}: joined again, {since}"),
-            worst(|run| run.back_s),
-            1.0,
-            "s",
-            &times,
-        ));
+        let let_go_s = worst(&runs, |run| run.let_go_s);
+        let back_s = worst(&runs, |run| run.back_s);
+        let subject = format!("{signal} {measure}");
+        rows.extend(let_go_and_back(&subject, let_go_s, (since, back_s), &times));
     }
     Ok(rows)
+}
+
+/// How soon a node that died was let go, and how soon it was back.
+pub(super) fn let_go_and_back(
+    subject: &str,
+    let_go_s: f64,
+    (since, back_s): (&str, f64),
+    times: &str,
+) -> [Row; 2] {
+    let let_go = format!("{subject}: let go by the server");
+    let back = format!("{subject}: joined again, {since}");
+    [
+        Row::at_most(let_go, let_go_s * 1e3, 600.0, "ms", times),
+        Row::at_most(back, back_s, 1.0, "s", times),
+    ]
 }

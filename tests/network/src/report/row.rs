@@ -151,6 +151,12 @@ pub fn csv(rows: &[Row]) -> String {
     text
 }
 
+/// The largest figure of some runs; NaN, a run without one, is the largest of all.
+pub(super) fn worst<T>(runs: &[T], of: impl Fn(&T) -> f64) -> f64 {
+    let figures = runs.iter().map(of);
+    figures.max_by(f64::total_cmp).unwrap_or(f64::NAN)
+}
+
 /// A few digits.
 pub(super) fn brief(value: f64) -> String {
     match value.abs() {

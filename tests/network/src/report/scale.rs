@@ -1,13 +1,11 @@
 //! Rows of what one more client costs.
 
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
-
 use taut_link::MulticastOptions;
 
 use super::row::{Row, brief};
 use super::sections::Extent;
-use crate::bench::BenchError;
 use crate::bench::scale::{cost, ways};
+use crate::bench::{BenchError, free_group};
 
 /// Longest run, s.
 const LONGEST: f64 = 5.0;
@@ -48,7 +46,11 @@ pub(super) fn scale_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
                 unicast.taken + unicast.lost
             ),
         ));
-        let group = group(place.address())?;
+        let group = MulticastOptions {
+            group: free_group(place.address())?,
+            announced: None,
+            interface: place.address(),
+        };
         let multicast = cost(&extent.this, place, clients, Some(group), seconds)?;
         rows.push(Row::at_most(
             format!("{clients} clients by multicast: broadcasting thread, a state"),
@@ -64,15 +66,4 @@ pub(super) fn scale_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
         ));
     }
     Ok(rows)
-}
-
-/// A group of this run alone.
-fn group(interface: Ipv4Addr) -> Result<MulticastOptions, BenchError> {
-    let port = UdpSocket::bind((interface, 0))?.local_addr()?.port();
-    let [high, low] = port.to_be_bytes();
-    Ok(MulticastOptions {
-        group: SocketAddrV4::new(Ipv4Addr::new(239, 255, high, low), port),
-        announced: None,
-        interface,
-    })
 }

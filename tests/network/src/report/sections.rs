@@ -6,11 +6,11 @@ use std::time::Duration;
 use taut_proto::membership::SilenceLimits;
 
 use super::frames::{failover_rows, skew_rows};
-use super::processes::{missing, screen_death_rows, server_kill_rows};
-use super::row::{Row, brief};
+use super::processes::{let_go_and_back, missing, screen_death_rows, server_kill_rows};
+use super::row::{Row, brief, worst};
 use super::scale::scale_rows;
 use crate::bench::age::{self, Age};
-use crate::bench::death::{self, Aftermath, Death};
+use crate::bench::death::{self, Death};
 use crate::bench::scale::Place;
 use crate::bench::{BenchError, events, isolation, join, latency};
 use crate::forge::attack;
@@ -60,6 +60,12 @@ pub struct Section {
     pub about: &'static str,
     /// Measures it.
     pub run: fn(&Extent) -> Result<Vec<Row>, BenchError>,
+}
+
+macro_rules! sections {
+    ($($name:literal: $run:expr, $about:literal;)*) => {
+        &[$(Section { name: $name, about: $about, run: $run }),*]
+    };
 }
 
 /// All parts, in the order of the table.
@@ -327,29 +333,24 @@ fn death_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
         for _ in 0..extent.deaths {
             runs.push(death::measure(&extent.this, death)?);
         }
-        let worst = |of: fn(&Aftermath) -> f64| runs.iter().map(of).fold(0.0, f64::max);
         let times = format!("largest of {}", runs.len());
         rows.push(Row::at_most(
             format!("{signal} of a node: others' longest time without a state"),
-            worst(|run| run.longest_gap_ms),
+            worst(&runs, |run| run.longest_gap_ms),
             THREE_FRAMES_MS,
             "ms",
-            format!("{times}; {} states missed", worst(|run| run.missed as f64)),
+            format!(
+                "{times}; {} states missed",
+                worst(&runs, |run| run.missed as f64)
+            ),
         ));
-        rows.push(Row::at_most(
-            format!("{signal} of a node: let go by the server"),
-            worst(|run| run.let_go_s * 1e3),
-            600.0,
-            "ms",
-            &times,
-        ));
-        rows.push(Row::at_most(
-            format!("{signal} of a node: joined again, from the start of its process"),
-            worst(|run| run.back_s),
-            1.0,
-            "s",
-            &times,
-        ));
+        let let_go_s = worst(&runs, |run| run.let_go_s);
+        let back = (
+            "from the start of its process",
+            worst(&runs, |run| run.back_s),
+        );
+        let subject = format!("{signal} of a node");
+        rows.extend(let_go_and_back(&subject, let_go_s, back, &times));
     }
     Ok(rows)
 }

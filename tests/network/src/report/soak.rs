@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::processes::missing;
 use super::row::Row;
 use super::sections::Extent;
 use crate::bench::soak_log::SoakLog;
@@ -74,9 +75,7 @@ pub(super) fn of_links(extent: &Extent) -> Result<Vec<Row>, BenchError> {
 
 pub(super) fn of_program(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     const WHAT: &str = "soak of the whole program";
-    let program = &extent.program;
-    if !program.is_file() {
-        let why = format!("{} is not there: --taut PROGRAM", program.display());
+    if let Some(why) = missing(extent) {
         return Ok(vec![Row::unknown(WHAT, "no promise broken", why)]);
     }
     let Some(seconds) = extent.soak_seconds else {
@@ -84,7 +83,7 @@ pub(super) fn of_program(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     };
     let duration = Duration::from_secs_f64(seconds);
     let mut log = SoakLog::open(extent.soak_log.as_deref())?;
-    let run = soak_program::run(program, duration, SEED, &mut log)?;
+    let run = soak_program::run(&extent.program, duration, SEED, &mut log)?;
     let broken = log.broken();
     let first = broken
         .first()
