@@ -21,7 +21,7 @@ use nalgebra::Vector3;
 
 use crate::clock::{TICK, Tick};
 use crate::cpu_time::quantile;
-use crate::measure::{FELT_FORCE, FIRST_FORCE, JND_DIRECTION, JND_MAGNITUDE, JND_TORQUE};
+use crate::measure::{FELT_FORCE, FIRST_FORCE, JND_DIRECTION, JND_MAGNITUDE, JND_TORQUE, largest};
 
 /// How far a step may be from that of the right answer, ticks.
 const MATCHED: usize = 5;
@@ -51,10 +51,8 @@ impl Felt {
         let ripple = ripple(&forces, &right);
         let each = (0..right.len()).map(|i| {
             let torque = torque(&angular(&ticks[i].wrench), &angular(&ideal[i]), arm);
-            [force(&forces[i], &right[i]), torque, steps[i], ripple[i]]
-                .into_iter()
-                // f64::max drops NaN: what is not a number is no small error.
-                .fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+            let terms = [force(&forces[i], &right[i]), torque, steps[i], ripple[i]];
+            largest(terms.into_iter())
         });
         Self {
             each: each.collect(),

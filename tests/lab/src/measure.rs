@@ -195,8 +195,8 @@ impl Measures {
     }
 }
 
-fn largest(values: impl Iterator<Item = f64>) -> f64 {
-    // f64::max drops NaN: a depth that is none must not.
+/// The largest of sizes; 0 of none, NaN where one is: f64::max would drop it.
+pub(crate) fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use god_object::{Pose, Settings, Vector6, World};
+use god_object::{Body, Obstacle, Pose, Settings, Vector6, World};
 
 use crate::methods::{
     Control, Discrete, GodObjectMethod, LinearisedPenalty, Penalty, PointGodObject, StaticCoupling,
@@ -55,7 +55,15 @@ pub struct Scene {
 
 impl Scene {
     /// With the default settings for a body of this size, m, and a device of this speed, m/s.
-    pub fn new(world: World, size: f64, speed: f64, start: Pose) -> Self {
+    pub fn new(
+        body: Body,
+        obstacles: impl Into<Vec<Obstacle>>,
+        size: f64,
+        speed: f64,
+        start: Pose,
+    ) -> Self {
+        let obstacles = obstacles.into();
+        let world = World { body, obstacles };
         let settings = world.settings_for(Settings::for_size(size));
         Self {
             world: Arc::new(world),

@@ -24,12 +24,16 @@ pub struct Line {
     pub limit: f64,
 }
 
-impl Line {
-    /// `measure <= limit`.
-    pub fn at_most(measure: Measure, limit: f64) -> Self {
-        Self { measure, limit }
+impl Measure {
+    /// The line `self <= limit`.
+    pub(crate) fn at_most(self, limit: f64) -> Line {
+        let measure = self;
+        Line { measure, limit }
     }
 }
+
+/// Lines at a rate of updates, Hz.
+pub type Lines = Box<dyn Fn(u32) -> Vec<Line> + Send + Sync>;
 
 /// A length at a time, s, of a body at a pose.
 pub type OverTime = Box<dyn Fn(f64, &Pose) -> f64 + Send + Sync>;
@@ -94,23 +98,25 @@ pub(crate) const OURS: &[Method] = &[Method::Ours, Method::OursByDefault];
 /// Why a force that ends may miss a line of what is felt.
 pub(crate) const STANDS_ASIDE: &str = "the force ends up to an update after the right answer's; the port lets both down at the same rate, so they stay apart while they fall";
 
-/// The same line for each of these methods at each of these rates, Hz.
+/// The same lines for each of these methods at each of these rates, Hz.
 pub(crate) fn open_for(
     methods: &[Method],
     rates: &[u32],
-    key: &'static str,
+    measures: &[Measure],
     reason: &'static str,
 ) -> Vec<Open> {
-    let of = |method: &Method, rate: &u32| Open {
-        key,
-        method: *method,
-        rate: *rate,
-        reason,
-    };
-    methods
-        .iter()
-        .flat_map(|method| rates.iter().map(move |rate| of(method, rate)))
-        .collect()
+    let mut open = Vec::new();
+    for key in measures.iter().map(|measure| measure.key()) {
+        for method in methods.iter().copied() {
+            open.extend(rates.iter().map(|&rate| Open {
+                key,
+                method,
+                rate,
+                reason,
+            }));
+        }
+    }
+    open
 }
 
 /// A pass line that this project's method does not keep, said openly: it is shown with its figure and is not a pass.
@@ -149,7 +155,7 @@ pub struct Recipe {
     /// How many start phases of the updates are run, evenly over a period.
     pub phases: u32,
     /// What passes at a rate of updates, Hz.
-    pub lines: Box<dyn Fn(u32) -> Vec<Line> + Send + Sync>,
+    pub lines: Lines,
     /// Numbers of this recipe alone.
     pub probes: Vec<Probe>,
     /// Why a method has no part in it; `None` where it has.
@@ -223,8 +229,8 @@ impl Recipe {
             return Vec::new();
         }
         vec![
-            Line::at_most(Measure::JndP95, JND_BUDGET),
-            Line::at_most(Measure::JndShare, JND_SHARE),
+            Measure::JndP95.at_most(JND_BUDGET),
+            Measure::JndShare.at_most(JND_SHARE),
         ]
     }
 

@@ -3,7 +3,7 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use god_object::{Body, Obstacle, Pose, Settings, World};
+use god_object::{Body, Obstacle, Pose, Settings};
 use nalgebra::{Point3, Vector3};
 use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::shapes::{Axis, box_with_hole, cylinder};
@@ -131,8 +131,7 @@ fn scene_of(
     stiffness: f64,
     start: Vector3<f64>,
 ) -> Scene {
-    let world = World { body, obstacles };
-    let mut scene = Scene::new(world, size, 0.1, Pose::from(start));
+    let mut scene = Scene::new(body, obstacles, size, 0.1, Pose::from(start));
     let mass = scene.world.body.mass;
     scene.settings = Settings {
         k_h: stiffness / (scene.settings.k_s * mass),

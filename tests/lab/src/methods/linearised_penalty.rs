@@ -269,11 +269,7 @@ mod tests {
     /// A cube of 10 mm above a plate.
     fn scene() -> Scene {
         let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        let world = World {
-            body: cube(0.005),
-            obstacles: vec![plate],
-        };
-        Scene::new(world, 0.01, 0.1, at(0.001))
+        Scene::new(cube(0.005), [plate], 0.01, 0.1, at(0.001))
     }
 
     fn at(height: f64) -> Pose {

@@ -177,11 +177,7 @@ mod tests {
 
     fn above_a_plate(body: Body) -> Scene {
         let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        let world = World {
-            body,
-            obstacles: vec![plate],
-        };
-        Scene::new(world, 0.01, 0.1, at(0.004))
+        Scene::new(body, [plate], 0.01, 0.1, at(0.004))
     }
 
     /// The lowest point of a body of 5 mm at a height, m.

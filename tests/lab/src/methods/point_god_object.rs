@@ -192,15 +192,14 @@ mod tests {
             let solid = mesh(cuboid([0.1; 3]));
             obstacle(name, solid, Pose::translation(at[0], at[1], at[2]))
         };
-        let world = World {
-            body: body(mesh(cuboid([0.005; 3]))),
-            obstacles: vec![
-                wall("x", [-0.1, 0.0, 0.0]),
-                wall("y", [0.1, -0.1, 0.0]),
-                wall("z", [0.1, 0.1, -0.1]),
-            ],
-        };
-        let scene = Scene::new(world, 0.01, 0.1, Pose::translation(0.02, 0.02, 0.02));
+        let held = body(mesh(cuboid([0.005; 3])));
+        let walls = [
+            wall("x", [-0.1, 0.0, 0.0]),
+            wall("y", [0.1, -0.1, 0.0]),
+            wall("z", [0.1, 0.1, -0.1]),
+        ];
+        let start = Pose::translation(0.02, 0.02, 0.02);
+        let scene = Scene::new(held, walls, 0.01, 0.1, start);
         let mut method = PointGodObject::new(&scene, 2.0);
         let device = Pose::translation(0.004, 0.003, 0.002);
         for _ in 0..10 {

@@ -218,11 +218,7 @@ mod tests {
     /// A body of 5 mm above a plate.
     fn scene(body: god_object::Body) -> Scene {
         let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        let world = World {
-            body,
-            obstacles: vec![plate],
-        };
-        Scene::new(world, 0.01, 0.1, at(0.004))
+        Scene::new(body, [plate], 0.01, 0.1, at(0.004))
     }
 
     #[test]

@@ -175,11 +175,13 @@ mod tests {
 
     fn scene() -> Scene {
         let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        let world = World {
-            body: cube(0.005),
-            obstacles: vec![plate],
-        };
-        Scene::new(world, 0.01, 0.1, Pose::translation(0.0, 0.0, 0.0055))
+        Scene::new(
+            cube(0.005),
+            [plate],
+            0.01,
+            0.1,
+            Pose::translation(0.0, 0.0, 0.0055),
+        )
     }
 
     #[test]

@@ -233,14 +233,10 @@ mod tests {
     /// period later, and what each millimetre of the spring comes to, N.
     fn half_a_period_after(height: f64, goes_on: bool) -> (f64, f64) {
         let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        let world = World {
-            body: cube(HALF),
-            obstacles: vec![plate],
-        };
         let updates = 10;
         let last = PERIOD * f64::from(updates);
         let at = |time: f64| Pose::translation(0.0, 0.0, HALF + height + SPEED * (last - time));
-        let scene = Scene::new(world, 0.01, SPEED, at(0.0));
+        let scene = Scene::new(cube(HALF), [plate], 0.01, SPEED, at(0.0));
         let coupling = VirtualCoupling::new(&scene, PERIOD, 0.0, 0.0);
         let mut coupling = if goes_on {
             coupling.going_on()

@@ -11,7 +11,6 @@
 
 use std::f64::consts::TAU;
 
-use god_object::World;
 use god_object::spatial::linear;
 
 use super::{HALF, at, driven};
@@ -27,11 +26,7 @@ const SWINGS: u32 = 256;
 
 /// A ball above a wall.
 pub(super) fn wall() -> Scene {
-    let world = World {
-        body: ball(HALF),
-        obstacles: vec![ground()],
-    };
-    Scene::new(world, 2.0 * HALF, 0.1, at(HALF + 1e-4))
+    Scene::new(ball(HALF), [ground()], 2.0 * HALF, 0.1, at(HALF + 1e-4))
 }
 
 /// K T / 2, N s/m.

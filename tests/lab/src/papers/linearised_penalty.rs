@@ -1,7 +1,6 @@
 //! Otaduy and Lin 2006: the simulation of the tool is passive and bears small masses, and it moves at the rate of the forces, however seldom contacts
 //! are looked for.
 
-use god_object::World;
 use god_object::spatial::linear;
 
 use super::{Figure, HALF, at, damping};
@@ -103,11 +102,7 @@ fn offset() -> f64 {
 /// A cube slides on a plane: the largest force along it over that across it, and the largest error of that
 /// across it, from half of the way on.
 fn slid(tuning: Tuning) -> (f64, f64) {
-    let world = World {
-        body: cube(HALF),
-        obstacles: vec![ground()],
-    };
-    let scene = Scene::new(world, 2.0 * HALF, SPEED, at(HALF + 1e-4));
+    let scene = Scene::new(cube(HALF), [ground()], 2.0 * HALF, SPEED, at(HALF + 1e-4));
     let period = f64::from(SELDOM) * TICK;
     let mut method = Method::LinearisedPenalty.start(&scene, period, tuning);
     let (mut along, mut error) = (0.0_f64, 0.0_f64);

@@ -1,7 +1,5 @@
 //! What holds of any penalty method: a force of so much for a depth, out of the nearest surface, and the bound of its spring.
 
-use god_object::World;
-
 use super::{Figure, HALF, TINY, at, damping, driven};
 use crate::clock::TICK;
 use crate::method::{Method, Scene};
@@ -18,11 +16,7 @@ pub(super) fn figures() -> Vec<Figure> {
         [-0.1, -0.1, -thickness].into(),
         [0.1, 0.1, 0.0].into(),
     );
-    let world = World {
-        body: cube(HALF),
-        obstacles: vec![plate],
-    };
-    let scene = Scene::new(world, 2.0 * HALF, 0.1, at(2.0 * HALF));
+    let scene = Scene::new(cube(HALF), [plate], 2.0 * HALF, 0.1, at(2.0 * HALF));
     // The deepest of its vertices.
     let tuning = Method::Penalty.tunings()[1];
     let depth = |tick: u32| STEP * (f64::from(tick) + 0.5);

@@ -1,6 +1,6 @@
 //! Zilles and Salisbury 1995: the god-object is the point of the surface nearest to the device, and nothing is too thin for it.
 
-use god_object::{Pose, World};
+use god_object::Pose;
 use nalgebra::Vector3;
 
 use super::{Figure, HALF, TINY, driven};
@@ -65,11 +65,7 @@ fn corner() -> Scene {
             at.map(|x| x + 0.1).into(),
         )
     };
-    let world = World {
-        body: cube(HALF),
-        obstacles: [[-0.1, 0.0, 0.0], [0.1, -0.1, 0.0], [0.1, 0.1, -0.1]]
-            .map(wall)
-            .into(),
-    };
-    Scene::new(world, 2.0 * HALF, 0.1, Pose::translation(0.02, 0.02, 0.02))
+    let walls = [[-0.1, 0.0, 0.0], [0.1, -0.1, 0.0], [0.1, 0.1, -0.1]].map(wall);
+    let start = Pose::translation(0.02, 0.02, 0.02);
+    Scene::new(cube(HALF), walls, 2.0 * HALF, 0.1, start)
 }

@@ -1,8 +1,6 @@
 //! Barbic and James 2008: the coupling saturates, so that a device that is far inside presses no deeper than the contacts bear; and a coupling without
 //! damping is a spring.
 
-use god_object::World;
-
 use super::{Figure, HALF, at, damping, driven};
 use crate::clock::TICK;
 use crate::method::{Method, Scene};
@@ -26,11 +24,7 @@ const AS_PUBLISHED: Tuning = Tuning::Static {
 
 pub(super) fn figures() -> Vec<Figure> {
     let plate = block("plate", [-0.1, -0.1, -PLATE].into(), [0.1, 0.1, 0.0].into());
-    let world = World {
-        body: cube(HALF),
-        obstacles: vec![plate],
-    };
-    let scene = Scene::new(world, 2.0 * HALF, 0.1, at(2.0 * HALF));
+    let scene = Scene::new(cube(HALF), [plate], 2.0 * HALF, 0.1, at(2.0 * HALF));
     let way = HALF + BEYOND;
     let height = |tick: u32| 2.0 * HALF - way * f64::from(tick) / f64::from(STEPS);
     let mut method = Method::StaticCoupling.start(&scene, TICK, AS_PUBLISHED);

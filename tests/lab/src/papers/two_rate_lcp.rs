@@ -1,6 +1,5 @@
 //! Duriez et al. 2006, Saupin et al. 2008: contacts hold exactly, whatever their number, and the loop of the forces is as live between updates as in one.
 
-use god_object::World;
 use god_object::spatial::linear;
 
 use super::{Figure, HALF, at};
@@ -16,11 +15,7 @@ const SPEED: f64 = 0.1;
 const DEEP: f64 = 2e-3;
 
 pub(super) fn figures() -> Vec<Figure> {
-    let world = World {
-        body: cube(HALF),
-        obstacles: vec![ground()],
-    };
-    let scene = Scene::new(world, 2.0 * HALF, SPEED, at(HALF));
+    let scene = Scene::new(cube(HALF), [ground()], 2.0 * HALF, SPEED, at(HALF));
     let tuning = Method::TwoRateLcp.tunings()[0];
     let mut method = Method::TwoRateLcp.start(&scene, f64::from(SELDOM) * TICK, tuning);
     let (mut along, mut error) = (0.0_f64, 0.0_f64);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use god_object::geometry::MeshError;
 use god_object::spatial::linear;
 use god_object::{Mesh, Pose, Settings, World};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use taut_method_tests::motion::Led;
 use taut_method_tests::solids::{cells, obstacle};
 use taut_scene::RawMesh;
@@ -177,16 +177,14 @@ fn with_feature() -> RawMesh {
 /// Forces of a ball that comes down on the plate, 3 mm deep, and slides.
 fn slide(raw: RawMesh, away: Vector3<f64>) -> Option<Vec<Vector3<f64>>> {
     let mesh = Mesh::new(raw.vertices, raw.triangles).ok()?;
-    let pose = Pose::translation(away.x, away.y, away.z);
     let world = Arc::new(World {
         body: ball(RADIUS),
-        obstacles: vec![obstacle("plate", mesh, pose)],
+        obstacles: vec![obstacle("plate", mesh, Pose::from(away))],
     });
     let at = |k: u32| {
         let time = f64::from(k) * 1e-3;
         let height = 1e-3 - (DEPTH + 1e-3) * (time / 0.1).min(1.0);
-        let place = Point3::new(0.1 * time, 1e-4, RADIUS + height) + away;
-        Pose::translation(place.x, place.y, place.z)
+        Pose::from(Vector3::new(0.1 * time, 1e-4, RADIUS + height) + away)
     };
     let settings = Settings::for_size(2.0 * RADIUS);
     let mut led = Led::in_world(world, &settings, at(0));

@@ -6,15 +6,13 @@ use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::RawMesh;
 use taut_scene::shapes::{cuboid, sphere};
 
-use crate::clock::Tick;
-use crate::measure::Measure;
-use crate::method::Method;
-use crate::recipe::Line;
+use crate::clock::{TICK, Tick};
+use crate::measure::{Measure, largest};
+use crate::method::{Method, Scene};
+use crate::recipe::{Line, Lines, Recipe};
 
 /// Deepest penetration that passes, m.
 const PENETRATION: f64 = 1e-6;
-/// A millisecond, s.
-const TICK: f64 = crate::clock::TICK;
 /// The force of a device that moves at a speed may change this much faster than that of a spring.
 const STEP_SLACK: f64 = 1.5;
 
@@ -42,7 +40,7 @@ pub(super) fn cube_mesh(half: f64) -> Mesh {
 /// A box along the axes between two corners.
 pub(crate) fn block(name: &str, low: Point3<f64>, high: Point3<f64>) -> Obstacle {
     let (half, middle) = ((high - low) * 0.5, nalgebra::center(&low, &high));
-    let pose = Pose::translation(middle.x, middle.y, middle.z);
+    let pose = Pose::from(middle.coords);
     obstacle(name, mesh(cuboid([half.x, half.y, half.z])), pose)
 }
 
@@ -63,15 +61,22 @@ pub(crate) fn force(x: f64, y: f64, z: f64) -> Vector6 {
 /// What every recipe asks: no penetration, nothing that is not a number.
 pub(super) fn sound() -> Vec<Line> {
     vec![
-        Line::at_most(Measure::Penetration, PENETRATION),
-        Line::at_most(Measure::Intersections, 0.0),
-        Line::at_most(Measure::NotFinite, 0.0),
+        Measure::Penetration.at_most(PENETRATION),
+        Measure::Intersections.at_most(0.0),
+        Measure::NotFinite.at_most(0.0),
     ]
+}
+
+/// That, and what the recipe asks itself at a rate, Hz.
+pub(super) fn sound_and<L: IntoIterator<Item = Line>>(
+    own: impl Fn(u32) -> L + Send + Sync + 'static,
+) -> Lines {
+    Box::new(move |rate| sound().into_iter().chain(own(rate)).collect())
 }
 
 /// Where the ideal does not jump, the force does not: the device moves at `speed`, m/s.
 pub(super) fn smooth(stiffness: f64, speed: f64) -> Line {
-    Line::at_most(Measure::Step, STEP_SLACK * stiffness * speed * TICK)
+    Measure::Step.at_most(STEP_SLACK * stiffness * speed * TICK)
 }
 
 /// For how long after a contact has ended the planes of the last set may still push, s: two updates on their way and one that is used.
@@ -131,9 +136,19 @@ impl Path {
 
     /// As a pose.
     pub(super) fn pose(&self, time: f64) -> Pose {
-        let place = self.at(time);
-        Pose::translation(place.x, place.y, place.z)
+        Pose::from(self.at(time))
     }
+}
+
+/// A recipe without a right answer, lines or probes yet, whose device goes along a path.
+pub(super) fn along(
+    case: (&'static str, String),
+    about: &'static str,
+    scene: Scene,
+    path: Path,
+) -> Recipe {
+    let duration = path.duration();
+    Recipe::new(case, about, scene, duration, move |time| path.pose(time))
 }
 
 /// Why the god-object of three degrees of freedom has no part in a recipe that turns its body.
@@ -162,9 +177,7 @@ pub(super) fn largest_from(
 ) -> impl Fn(&[Tick]) -> f64 + Send + Sync + 'static {
     move |ticks| {
         let late = ticks.iter().filter(|tick| tick.time >= begin);
-        // f64::max drops NaN: a number that is none must not be dropped.
-        late.map(&value)
-            .fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+        largest(late.map(&value))
     }
 }
 

@@ -2,17 +2,17 @@
 
 use std::f64::consts::PI;
 
-use god_object::{Pose, World};
+use god_object::Pose;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::{data_file, read_mesh};
 
 use super::Extent;
-use super::bodies::{sound, turns};
+use super::bodies::{sound_and, turns};
 use crate::clock::RATES;
 use crate::measure::Measure;
 use crate::method::{Method, Scene};
-use crate::recipe::{Ideal, Line, OURS, Open, Recipe, open_for};
+use crate::recipe::{Ideal, OURS, Open, Recipe, open_for};
 use crate::row::Row;
 
 /// Of 5,000 triangles.
@@ -46,15 +46,11 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
 
 /// What no method keeps here, taut's neither.
 fn open(file: &str) -> Vec<Open> {
-    let felt = [Measure::JndP95, Measure::JndShare];
     let ripple = "small steps of the right answer, from facet to facet, come up to 2 ms late, and each fills a window of ripple";
-    let mut lines: Vec<Open> = felt
-        .iter()
-        .flat_map(|line| open_for(OURS, &RATES, line.key(), ripple))
-        .collect();
+    let mut lines = open_for(OURS, &RATES, &[Measure::JndP95, Measure::JndShare], ripple);
     if file == LARGE {
         let fork = "at rest 15 um from the surface, or an update late, the body takes the other branch of a fork of the right answer";
-        let line = Measure::ForceP95.key();
+        let line = &[Measure::ForceP95];
         lines.extend(open_for(&[Method::OursByDefault], &RATES, line, fork));
         lines.extend(open_for(&[Method::Ours], &[70, 300], line, fork));
     }
@@ -70,10 +66,7 @@ fn recipe(file: &str) -> Option<Recipe> {
     let raw = read_mesh(&data_file(file)?).unwrap_or_else(|error| panic!("{error}"));
     let thousands = (raw.triangles.len() + 500) / 1000;
     let bunny = mesh(raw);
-    let world = World {
-        body: body(bunny.clone()),
-        obstacles: vec![obstacle("bunny", bunny, Pose::identity())],
-    };
+    let obstacles = [obstacle("bunny", bunny.clone(), Pose::identity())];
     let device = |time: f64| {
         // Down in half a second; sideways along the back; then a twist.
         let down = (time / 0.5).min(1.0);
@@ -86,7 +79,7 @@ fn recipe(file: &str) -> Option<Recipe> {
             UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.4, 0.1) * smooth(twist)),
         )
     };
-    let scene = Scene::new(world, SIZE, 0.27, device(0.0));
+    let scene = Scene::new(body(bunny), obstacles, SIZE, 0.27, device(0.0));
     let case = (
         "R27",
         format!("bunny on bunny, {thousands},000 triangles each"),
@@ -94,11 +87,7 @@ fn recipe(file: &str) -> Option<Recipe> {
     let about = "free forms: approach, slide, press, twist";
     Some(Recipe {
         ideal: Ideal::Oracle,
-        lines: Box::new(|_| {
-            let mut lines = sound();
-            lines.push(Line::at_most(Measure::ForceP95, FORCE_ERROR));
-            lines
-        }),
+        lines: sound_and(|_| [Measure::ForceP95.at_most(FORCE_ERROR)]),
         check_every: 10,
         out_of_scope: turns,
         open: open(file),

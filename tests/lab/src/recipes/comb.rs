@@ -2,17 +2,17 @@
 
 use std::f64::consts::PI;
 
+use god_object::Pose;
 use god_object::spatial::{angular, linear, six};
-use god_object::{Pose, World};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use taut_method_tests::machined::Gear;
 use taut_method_tests::solids::{body, cells, mesh, obstacle};
 
 use super::Extent;
-use super::bodies::{Path, force, largest_from, smooth, sound, turns};
+use super::bodies::{Path, along, force, largest_from, smooth, sound_and, turns};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Probe, Recipe};
+use crate::recipe::{Ideal, Probe, Recipe};
 
 const PITCH: f64 = 4e-3;
 const TOOTH: f64 = 2e-3;
@@ -55,10 +55,6 @@ fn comb(extent: Extent, clearance: f64) -> Recipe {
     let mut held = body(mesh(upper));
     // In the middle of the teeth: a push to the side has no lever.
     held.reference_point = Point3::new(0.0, 0.0, -0.5 * DEPTH);
-    let world = World {
-        body: held,
-        obstacles: vec![obstacle("comb", mesh(lower), Pose::identity())],
-    };
     let at = |x: f64, z: f64| Vector3::new(x, 0.0, z);
     let inserted = DEPTH + 2e-3; // 8 mm of the teeth overlap
     let path = Path::from(at(0.0, 2.0 * DEPTH + 1e-3))
@@ -68,12 +64,12 @@ fn comb(extent: Extent, clearance: f64) -> Recipe {
         .to(at(-OFFSET, inserted), SPEED)
         .hold(0.1)
         .to(at(0.0, inserted), SPEED);
-    let scene = Scene::new(world, SIZE, SPEED, path.pose(0.0));
+    let comb = obstacle("comb", mesh(lower), Pose::identity());
+    let scene = Scene::new(held, [comb], SIZE, SPEED, path.pose(0.0));
     let (stiffness, rest) = (scene.stiffness(), scene.settings.rest_distance);
     let ideal = path.clone();
     let case = ("R25", format!("combs, clearance {} mm", clearance * 1e3));
     let about = "many contacts: locks after its clearance, whatever their number";
-    let duration = path.duration();
     Recipe {
         ideal: Ideal::closed(move |time| {
             let x = ideal.at(time).x;
@@ -84,11 +80,11 @@ fn comb(extent: Extent, clearance: f64) -> Recipe {
             )
         }),
         phases: extent.choose(5, 1),
-        lines: Box::new(move |_| {
-            let mut lines = sound();
-            lines.push(smooth(stiffness, SPEED));
-            lines.push(Line::at_most(Measure::ForceP95, 3.0 * stiffness * rest));
-            lines
+        lines: sound_and(move |_| {
+            [
+                smooth(stiffness, SPEED),
+                Measure::ForceP95.at_most(3.0 * stiffness * rest),
+            ]
         }),
         probes: vec![Probe::at_most(
             "torque",
@@ -96,7 +92,7 @@ fn comb(extent: Extent, clearance: f64) -> Recipe {
             0.01 * stiffness * OFFSET * DEPTH,
             largest_from(0.0, |tick| angular(&tick.wrench).norm()),
         )],
-        ..Recipe::new(case, about, scene, duration, move |time| path.pose(time))
+        ..along(case, about, scene, path)
     }
 }
 
@@ -143,17 +139,14 @@ fn gear(extent: Extent) -> Recipe {
     );
     let held = body(mesh(turning.mesh()));
     let (inertia, base) = (held.inertia[(2, 2)], turning.base_radius());
-    let world = World {
-        body: held,
-        obstacles: vec![obstacle("gear", mesh(standing.mesh()), place)],
-    };
     let device = |time: f64| {
         Pose::from_parts(
             Translation3::identity(),
             UnitQuaternion::from_scaled_axis(Vector3::z() * turned(time)),
         )
     };
-    let scene = Scene::new(world, SIZE, RATE * 0.022, device(0.0));
+    let gear = obstacle("gear", mesh(standing.mesh()), place);
+    let scene = Scene::new(held, [gear], SIZE, RATE * 0.022, device(0.0));
     let gain = scene.settings.k_h * scene.settings.k_s;
     let rest = scene.settings.rest_distance;
     let play = turning.set_back / turning.pitch_radius();
@@ -174,12 +167,10 @@ fn gear(extent: Extent) -> Recipe {
             let force = Vector3::new(-along.sin(), -side * along.cos(), 0.0) * size;
             six(&force, &(Vector3::z() * torque))
         }),
-        lines: Box::new(move |_| {
-            let mut lines = sound();
+        lines: sound_and(move |_| {
             // Facets of the flanks, and the rest distance at the second pair of teeth.
             let slack = 0.02 * most + gain * base * 3.0 * rest;
-            lines.push(Line::at_most(Measure::TorqueP95, slack));
-            lines
+            [Measure::TorqueP95.at_most(slack)]
         }),
         probes: vec![Probe::at_most(
             "force_across_plane",

@@ -1,16 +1,16 @@
 //! R08: a small ball is moved over a convex edge by a device inside the solid. The force turns where the ideal one does, and no later.
 
 use god_object::spatial::linear;
-use god_object::{ForceShading, Obstacle, Pose, Vector6, World};
+use god_object::{ForceShading, Obstacle, Pose, Vector6};
 use nalgebra::Vector3;
 use taut_method_tests::solids::obstacle;
 
 use super::Extent;
-use super::bodies::{Path, ball, does_not_shade, drawn_out, force, ghost_time, sound};
+use super::bodies::{Path, along, ball, does_not_shade, drawn_out, force, ghost_time, sound_and};
 use crate::clock::{TICK, Tick};
-use crate::measure::{JND_MAGNITUDE, Measure};
+use crate::measure::{JND_MAGNITUDE, Measure, largest};
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Probe, Recipe};
+use crate::recipe::{Ideal, Probe, Recipe};
 
 const TIP: f64 = 1e-3;
 const DEPTH: f64 = 3e-3;
@@ -77,30 +77,30 @@ fn largest_turn(ticks: &[Tick]) -> f64 {
 }
 
 fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
-    let world = World {
-        body: ball(TIP),
-        obstacles: vec![solid(degrees, shaded)],
-    };
     let at = |x: f64, z: f64| Vector3::new(x, 0.0, TIP + z);
     let path = Path::from(at(-0.03, 1e-3))
         .to(at(-0.03, -DEPTH), 0.05)
         .hold(0.1)
         .to(at(0.03, -DEPTH), SPEED)
         .hold(0.05);
-    let scene = Scene::new(world, 2.0 * TIP, SPEED, path.pose(0.0));
+    let scene = Scene::new(
+        ball(TIP),
+        [solid(degrees, shaded)],
+        2.0 * TIP,
+        SPEED,
+        path.pose(0.0),
+    );
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
     let led = path.clone();
     let surface = if shaded { ", shaded" } else { "" };
     let case = ("R08", format!("edge of {degrees} degrees{surface}"));
     let about = "convex edge: the force turns where the ideal one does";
-    let duration = path.duration();
     let right = stiffness * DEPTH;
     // The device is at its depth, and the ball has come to rest.
     let (from, to) = (0.08 + 0.05, 0.08 + 0.1);
     let before = move |ticks: &[Tick]| {
         let held = ticks.iter().filter(|t| (from..to).contains(&t.time));
-        let off = held.map(|tick| 100.0 * (linear(&tick.wrench).norm() / right - 1.0).abs());
-        off.fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+        largest(held.map(|tick| 100.0 * (linear(&tick.wrench).norm() / right - 1.0).abs()))
     };
     let limit = if shaded { TURN } else { f64::INFINITY };
     Recipe {
@@ -111,19 +111,15 @@ fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
             Ideal::closed(move |time| ideal(degrees, stiffness, led.at(time)))
         },
         phases: extent.choose(20, 2),
-        lines: Box::new(move |rate| {
-            let mut lines = sound();
-            if !shaded {
-                let late = ghost_time(k_s, rate) + TICKS * TICK;
-                lines.push(Line::at_most(Measure::FalseForce, late));
-            }
-            lines
+        lines: sound_and(move |rate| {
+            let late = ghost_time(k_s, rate) + TICKS * TICK;
+            (!shaded).then_some(Measure::FalseForce.at_most(late))
         }),
         probes: vec![
             Probe::at_most("turn_of_force", "deg/ms", limit, largest_turn),
             Probe::at_most("force_before_edge", "%", 100.0 * JND_MAGNITUDE, before),
         ],
         out_of_scope: if shaded { does_not_shade } else { |_| None },
-        ..Recipe::new(case, about, scene, duration, move |time| path.pose(time))
+        ..along(case, about, scene, path)
     }
 }

@@ -3,15 +3,15 @@
 //! The right answer for a prism is that of the prism, not of the cylinder it stands for: what facets add is no error of a method. The line is
 //! what is felt, half of 18.4 degrees.
 
-use god_object::{Pose, Primitive, World};
+use god_object::{Pose, Primitive};
 use nalgebra::Point3;
 
 use super::Extent;
-use super::bodies::{ball, force, smooth, sound};
+use super::bodies::{ball, force, smooth, sound_and};
 use super::prism::{Prism, out};
 use crate::measure::{JND_DIRECTION, Measure};
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Recipe};
 
 /// Of the ball, m: the point that it stands for goes round at the cylinder's radius and this.
 const TIP: f64 = 1e-3;
@@ -49,10 +49,6 @@ fn recipe(radius: f64, speed: f64, sides: Option<usize>) -> Recipe {
     });
     // The middle of a side is nearer to the axis than a corner.
     let sunk = sides.map_or(0.0, |_| solid - prism.apothem());
-    let world = World {
-        body: ball(TIP),
-        obstacles: vec![round],
-    };
     let arrived = (APPROACH + DEPTH) / APPROACH_SPEED;
     let begin = arrived + WAIT;
     // Depth, and angle from the z axis towards the x axis.
@@ -63,10 +59,15 @@ fn recipe(radius: f64, speed: f64, sides: Option<usize>) -> Recipe {
     };
     let device = move |time: f64| {
         let (depth, angle) = place(time);
-        let at = out(angle) * (radius - depth);
-        Pose::translation(at.x, at.y, at.z)
+        Pose::from(out(angle) * (radius - depth))
     };
-    let scene = Scene::new(world, 2.0 * TIP, speed.max(APPROACH_SPEED), device(0.0));
+    let scene = Scene::new(
+        ball(TIP),
+        [round],
+        2.0 * TIP,
+        speed.max(APPROACH_SPEED),
+        device(0.0),
+    );
     let stiffness = scene.stiffness();
     let name = sides.map_or_else(String::new, |n| format!(", {n} sides"));
     let duration = begin + std::f64::consts::PI * radius / speed;
@@ -84,16 +85,10 @@ fn recipe(radius: f64, speed: f64, sides: Option<usize>) -> Recipe {
             let place = body.translation;
             (radius - sunk - place.x.hypot(place.z)).max(0.0)
         }),
-        astray: Box::new(|_, _| 0.0),
-        phases: 1,
-        lines: Box::new(move |_| {
-            let mut lines = sound();
-            if sides.is_none() {
-                lines.push(smooth(stiffness, speed));
-            }
-            let half = 0.5 * JND_DIRECTION;
-            lines.push(Line::at_most(Measure::DirectionP95, half));
-            lines
+        lines: sound_and(move |_| {
+            let smooth = sides.is_none().then(|| smooth(stiffness, speed));
+            let direction = Measure::DirectionP95.at_most(0.5 * JND_DIRECTION);
+            smooth.into_iter().chain([direction])
         }),
         ..Recipe::new(
             (

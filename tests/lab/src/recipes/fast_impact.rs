@@ -1,13 +1,12 @@
 //! R10a: a cube of a millimetre is thrown at a plate of a tenth of one: up to 71 mm between updates.
 
-use god_object::World;
 use nalgebra::{Point3, Vector3};
 
 use super::Extent;
-use super::bodies::{Path, block, cube, cube_mesh, force, smooth, sound};
+use super::bodies::{Path, along, block, cube, cube_mesh, force, smooth, sound_and};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Recipe};
 use crate::vertex_depth::Convex;
 
 const HALF: f64 = 0.5e-3;
@@ -25,18 +24,16 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
 fn recipe(extent: Extent, speed: f64) -> Recipe {
     let low = Point3::new(-0.1, -0.1, -THICKNESS);
     let high = Point3::new(0.1, 0.1, 0.0);
-    let world = World {
-        body: cube(HALF),
-        obstacles: vec![block("plate", low, high)],
-    };
     let at = |z: f64| Vector3::new(1e-3, 2e-3, z);
     let path = Path::from(at(0.25)).to(at(-0.05), speed).hold(WAIT);
-    let scene = Scene::new(world, 2.0 * HALF, speed, path.pose(0.0));
+    let plate = block("plate", low, high);
+    let scene = Scene::new(cube(HALF), [plate], 2.0 * HALF, speed, path.pose(0.0));
     let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
     let ideal = path.clone();
     let rest = path.duration() - AT_REST;
     let (plate, body) = (Convex::cuboid(low, high), cube_mesh(HALF));
-    let duration = path.duration();
+    let case = ("R10a", format!("{speed} m/s"));
+    let about = "fast impact: stops at first contact";
     Recipe {
         ideal: Ideal::closed(move |time| {
             let depth = (HALF - ideal.at(time).z).max(0.0);
@@ -52,18 +49,12 @@ fn recipe(extent: Extent, speed: f64) -> Recipe {
             }
         }),
         phases: extent.choose(20, 4),
-        lines: Box::new(move |_| {
-            let mut lines = sound();
-            lines.push(smooth(stiffness, speed));
-            lines.push(Line::at_most(Measure::Astray, REST_ERROR));
-            lines
+        lines: sound_and(move |_| {
+            [
+                smooth(stiffness, speed),
+                Measure::Astray.at_most(REST_ERROR),
+            ]
         }),
-        ..Recipe::new(
-            ("R10a", format!("{speed} m/s")),
-            "fast impact: stops at first contact",
-            scene,
-            duration,
-            move |time| path.pose(time),
-        )
+        ..along(case, about, scene, path)
     }
 }

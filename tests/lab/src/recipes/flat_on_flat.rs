@@ -1,17 +1,16 @@
 //! R04: a box pressed flat on a plane by a device that goes through it and tilts. While the contacts can hold the tilt the box stays flat.
 
-use god_object::World;
 use god_object::spatial::{Pose, six};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use taut_method_tests::solids::{body, mesh};
 use taut_scene::shapes::cuboid;
 
 use super::Extent;
-use super::bodies::{ground, smooth, sound, turns};
+use super::bodies::{ground, smooth, sound_and, turns};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Recipe};
 use crate::vertex_depth::Convex;
 
 /// Of the box, m.
@@ -31,10 +30,6 @@ const TORQUE_ERROR: f64 = 0.01;
 pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     let held = body(mesh(cuboid(HALF)));
     let inertia = held.inertia[(1, 1)];
-    let world = World {
-        body: held.clone(),
-        obstacles: vec![ground()],
-    };
     // While |I w| <= m d a the resultant stays within the base.
     let tilt = SHARE * held.mass * DEPTH * HALF[0] / inertia;
     let pressed = (FROM + DEPTH) / SPEED;
@@ -50,7 +45,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             UnitQuaternion::from_scaled_axis(Vector3::new(0.0, turned, 0.0)),
         )
     };
-    let mut scene = Scene::new(world, 2.0 * HALF[0], SPEED, device(0.0));
+    let mut scene = Scene::new(held.clone(), [ground()], 2.0 * HALF[0], SPEED, device(0.0));
     // What the tilt asks for is above the default limit of a device.
     scene.settings.torque_limit = 10.0;
     let (stiffness, gain) = (scene.stiffness(), scene.settings.k_h * scene.settings.k_s);
@@ -69,13 +64,13 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         }),
         depth: Box::new(move |pose| half_space.deepest(&held.mesh, pose)),
         phases: extent.choose(5, 1),
-        lines: Box::new(move |_| {
-            let mut lines = sound();
-            lines.push(smooth(stiffness, SPEED));
-            lines.push(Line::at_most(Measure::FalseForce, TICKS * TICK));
+        lines: sound_and(move |_| {
             let most = gain * inertia * tilt;
-            lines.push(Line::at_most(Measure::TorqueP95, TORQUE_ERROR * most));
-            lines
+            [
+                smooth(stiffness, SPEED),
+                Measure::FalseForce.at_most(TICKS * TICK),
+                Measure::TorqueP95.at_most(TORQUE_ERROR * most),
+            ]
         }),
         out_of_scope: turns,
         ..Recipe::new(case, about, scene, duration, device)

@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use god_object::World;
 use god_object::spatial::{Pose, angular, linear};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
@@ -21,10 +20,7 @@ const TURN: f64 = 1.0;
 
 pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     let low = Point3::new(-0.3, -0.3, -1.1);
-    let world = World {
-        body: cube(HALF),
-        obstacles: vec![block("far ground", low, Point3::new(0.3, 0.3, -1.0))],
-    };
+    let obstacles = [block("far ground", low, Point3::new(0.3, 0.3, -1.0))];
     let device = |time: f64| {
         let [x, y, z] = FREQUENCIES.map(|f| REACH * (TAU * f * time).sin());
         let axis = Vector3::new(1.0, 2.0, 3.0) / 14.0_f64.sqrt();
@@ -35,7 +31,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         )
     };
     let speed = REACH * TAU * Vector3::from(FREQUENCIES).norm();
-    let scene = Scene::new(world, 2.0 * HALF, speed, device(0.0));
+    let scene = Scene::new(cube(HALF), obstacles, 2.0 * HALF, speed, device(0.0));
     let case = ("R01", "Lissajous figure".to_owned());
     let about = "free space: no force and no torque";
     let k_s = scene.settings.k_s;

@@ -1,16 +1,16 @@
 //! R30: a box on a rough table, pulled to the side: it sticks up to the cone, slides above it, in every direction alike.
 
-use god_object::{Pose, World};
+use god_object::Pose;
 use nalgebra::Vector3;
 use taut_method_tests::solids::{body, mesh};
 use taut_scene::shapes::cuboid;
 
 use super::Extent;
-use super::bodies::{Path, force, ground, ours_alone, smooth, sound};
+use super::bodies::{Path, force, ground, ours_alone, smooth, sound_and};
 use crate::clock::{TICK, Tick};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Probe, Recipe};
+use crate::recipe::{Ideal, Probe, Recipe};
 
 const HALF: [f64; 3] = [0.02, 0.02, 0.01];
 /// tan 20 degrees.
@@ -36,17 +36,14 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
 fn recipe(angle: f64) -> Recipe {
     let mut table = ground();
     table.surface.friction = COEFFICIENT;
-    let world = World {
-        body: body(mesh(cuboid(HALF))),
-        obstacles: vec![table],
-    };
     let at = |x: f64, z: f64| Vector3::new(x * angle.cos(), x * angle.sin(), HALF[2] + z);
     let path = Path::from(at(0.0, 1e-3))
         .to(at(0.0, -DEPTH), PRESSING)
         .hold(0.1);
     let pulled = path.duration();
     let path = path.to(at(REACH, -DEPTH), PULLING).hold(0.1);
-    let scene = Scene::new(world, 2.0 * HALF[0], PRESSING, path.pose(0.0));
+    let held = body(mesh(cuboid(HALF)));
+    let scene = Scene::new(held, [table], 2.0 * HALF[0], PRESSING, path.pose(0.0));
     let stiffness = scene.stiffness();
     let (ideal, device) = (path.clone(), path.clone());
     // The device is here when the cone is nearly full.
@@ -79,12 +76,12 @@ fn recipe(angle: f64) -> Recipe {
             force(back.x, back.y, load)
         }),
         depth: Box::new(|body: &Pose| (HALF[2] - body.translation.z).max(0.0)),
-        lines: Box::new(move |_| {
-            let mut lines = sound();
-            lines.push(smooth(stiffness, PRESSING));
-            lines.push(Line::at_most(Measure::MagnitudeP95, MAGNITUDE));
-            lines.push(Line::at_most(Measure::DirectionMax, DIRECTION));
-            lines
+        lines: sound_and(move |_| {
+            [
+                smooth(stiffness, PRESSING),
+                Measure::MagnitudeP95.at_most(MAGNITUDE),
+                Measure::DirectionMax.at_most(DIRECTION),
+            ]
         }),
         probes: vec![Probe::at_most("creep", "m/s", CREEP, creep)],
         out_of_scope: |method| ours_alone(method, "it is frictionless"),

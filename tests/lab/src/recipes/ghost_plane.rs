@@ -1,14 +1,13 @@
 //! R13: a small ball slides off the end of a plate. Planes that are some updates old reach past the end and push on.
 
-use god_object::World;
 use nalgebra::{Point3, Vector3};
 
 use super::Extent;
-use super::bodies::{Path, ball, block, force, ghost_time, sound};
+use super::bodies::{Path, along, ball, block, force, ghost_time, sound_and};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, OURS, Recipe, STANDS_ASIDE, open_for};
+use crate::recipe::{Ideal, OURS, Recipe, STANDS_ASIDE, open_for};
 use crate::vertex_depth::Convex;
 
 const TIP: f64 = 1e-3;
@@ -20,21 +19,19 @@ const TICKS: f64 = 2.0;
 pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     let low = Point3::new(-0.2, -0.1, -0.02);
     let high = Point3::new(0.0, 0.1, 0.0);
-    let world = World {
-        body: ball(TIP),
-        obstacles: vec![block("plate", low, high)],
-    };
     let at = |x: f64, z: f64| Vector3::new(x, 0.0, TIP + z);
     let path = Path::from(at(-0.05, 1e-3))
         .to(at(-0.05, -DEPTH), 0.05)
         .hold(0.1)
         .to(at(0.05, -DEPTH), SPEED)
         .hold(0.1);
-    let scene = Scene::new(world, 2.0 * TIP, SPEED, path.pose(0.0));
+    let plate = block("plate", low, high);
+    let scene = Scene::new(ball(TIP), [plate], 2.0 * TIP, SPEED, path.pose(0.0));
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
     let ideal = path.clone();
     let plate = Convex::cuboid(low, high);
-    let duration = path.duration();
+    let case = ("R13", "end of a plate".into());
+    let about = "ghost plane: no force past the end";
     vec![Recipe {
         ideal: Ideal::closed(move |time| {
             // Past the end the ball falls to the side of the plate, which holds its centre one radius away.
@@ -56,21 +53,12 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
                 TIP + plate.depth(&centre)
             }
         }),
-        astray: Box::new(|_, _| 0.0),
         phases: extent.choose(20, 4),
-        lines: Box::new(move |rate| {
-            let mut lines = sound();
+        lines: sound_and(move |rate| {
             let push = ghost_time(k_s, rate) + TICKS * TICK;
-            lines.push(Line::at_most(Measure::FalseForce, push));
-            lines
+            [Measure::FalseForce.at_most(push)]
         }),
-        open: open_for(OURS, &[300], Measure::JndShare.key(), STANDS_ASIDE),
-        ..Recipe::new(
-            ("R13", "end of a plate".into()),
-            "ghost plane: no force past the end",
-            scene,
-            duration,
-            move |time| path.pose(time),
-        )
+        open: open_for(OURS, &[300], &[Measure::JndShare], STANDS_ASIDE),
+        ..along(case, about, scene, path)
     }]
 }

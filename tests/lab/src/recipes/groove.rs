@@ -1,16 +1,16 @@
 //! R06 and R07 with bodies: a ball in a V-groove, and a ball in a corner of three walls.
 
-use god_object::{Obstacle, Pose, World};
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use god_object::{Obstacle, Pose};
+use nalgebra::{UnitQuaternion, Vector3};
 use taut_method_tests::solids::{mesh, obstacle};
 use taut_scene::shapes::cuboid;
 
 use super::Extent;
-use super::bodies::{Path, ball, block, force, ghost_time, smooth, sound};
+use super::bodies::{Path, along, ball, block, force, ghost_time, smooth, sound_and};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Recipe};
 
 const RADIUS: f64 = 5e-3;
 const SPEED: f64 = 0.05;
@@ -42,10 +42,6 @@ fn groove(degrees: f64) -> Recipe {
     let normals = [1.0, -1.0].map(|side| Vector3::new(side * cosine, 0.0, sine));
     // The centre at the bottom is the origin.
     let faces = [0, 1].map(|i| slab(["left", "right"][i], normals[i] * -RADIUS, normals[i]));
-    let world = World {
-        body: ball(RADIUS),
-        obstacles: faces.into(),
-    };
     let limit = DOWN * cosine / sine;
     let across = 2.0 * limit.min(5e-3);
     let path = Path::from(Vector3::new(0.0, 0.0, 3e-3))
@@ -54,12 +50,11 @@ fn groove(degrees: f64) -> Recipe {
         .to(Vector3::new(across, 0.0, -DOWN), SPEED)
         .to(Vector3::new(-across, 0.0, -DOWN), SPEED)
         .hold(0.05);
-    let scene = Scene::new(world, 2.0 * RADIUS, SPEED, path.pose(0.0));
+    let scene = Scene::new(ball(RADIUS), faces, 2.0 * RADIUS, SPEED, path.pose(0.0));
     let stiffness = scene.stiffness();
     let ideal = path.clone();
     let case = ("R06", format!("ball in a groove of {degrees} degrees"));
     let about = "V-groove: held within its angle, up one face beyond";
-    let duration = path.duration();
     Recipe {
         ideal: Ideal::closed(move |time| {
             let place = ideal.at(time);
@@ -83,38 +78,18 @@ fn groove(degrees: f64) -> Recipe {
             let place = body.translation.vector;
             normals.iter().map(|n| -n.dot(&place)).fold(0.0, f64::max)
         }),
-        lines: Box::new(move |_| {
-            let mut lines = sound();
-            lines.push(smooth(stiffness, SPEED));
-            lines.push(Line::at_most(Measure::FalseForce, 0.0));
-            lines
-        }),
-        ..Recipe::new(case, about, scene, duration, move |time| path.pose(time))
+        lines: sound_and(move |_| [smooth(stiffness, SPEED), Measure::FalseForce.at_most(0.0)]),
+        ..along(case, about, scene, path)
     }
 }
 
 fn corner() -> Recipe {
-    let wall = |name, low, high| block(name, low, high);
-    let world = World {
-        body: ball(RADIUS),
-        obstacles: vec![
-            wall(
-                "floor",
-                Point3::new(-0.1, -0.1, -0.1),
-                Point3::new(0.2, 0.2, 0.0),
-            ),
-            wall(
-                "left",
-                Point3::new(-0.1, -0.1, -0.1),
-                Point3::new(0.0, 0.2, 0.2),
-            ),
-            wall(
-                "back",
-                Point3::new(-0.1, -0.1, -0.1),
-                Point3::new(0.2, 0.0, 0.2),
-            ),
-        ],
-    };
+    let walls = [
+        ("floor", [0.2, 0.2, 0.0]),
+        ("left", [0.0, 0.2, 0.2]),
+        ("back", [0.2, 0.0, 0.2]),
+    ];
+    let walls = walls.map(|(name, high)| block(name, [-0.1; 3].into(), high.into()));
     let at = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) + Vector3::repeat(RADIUS);
     let path = Path::from(at(0.01, 0.012, 0.008))
         .to(at(0.01, 0.012, -2e-3), SPEED)
@@ -123,12 +98,11 @@ fn corner() -> Recipe {
         .hold(0.1)
         .to(at(5e-3, -4e-3, 5e-3), SPEED)
         .to(at(5e-3, 5e-3, 5e-3), SPEED);
-    let scene = Scene::new(world, 2.0 * RADIUS, SPEED, path.pose(0.0));
+    let scene = Scene::new(ball(RADIUS), walls, 2.0 * RADIUS, SPEED, path.pose(0.0));
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
     let ideal = path.clone();
     let case = ("R07", "ball in a corner".to_owned());
     let about = "corner of three walls: each holds its axis";
-    let duration = path.duration();
     Recipe {
         ideal: Ideal::closed(move |time| {
             let depth = (Vector3::repeat(RADIUS) - ideal.at(time)).sup(&Vector3::zeros());
@@ -139,13 +113,13 @@ fn corner() -> Recipe {
             let place = body.translation.vector;
             (RADIUS - place.min()).max(0.0)
         }),
-        lines: Box::new(move |rate| {
-            let mut lines = sound();
-            lines.push(smooth(stiffness, SPEED));
+        lines: sound_and(move |rate| {
             let settle = ghost_time(k_s, rate) + 2.0 * TICK;
-            lines.push(Line::at_most(Measure::FalseForce, settle));
-            lines
+            [
+                smooth(stiffness, SPEED),
+                Measure::FalseForce.at_most(settle),
+            ]
         }),
-        ..Recipe::new(case, about, scene, duration, move |time| path.pose(time))
+        ..along(case, about, scene, path)
     }
 }

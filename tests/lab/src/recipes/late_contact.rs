@@ -1,14 +1,13 @@
 //! R11: a ball is moved into a plane at constant speed and out again. A force that begins late begins as a step.
 
-use god_object::World;
 use nalgebra::Vector3;
 
 use super::Extent;
-use super::bodies::{Path, ball, force, ground, sound};
+use super::bodies::{Path, along, ball, force, ground, sound_and};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Recipe};
 
 const RADIUS: f64 = 5e-3;
 /// Where the device begins, turns and ends, m above the plane.
@@ -25,40 +24,36 @@ pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
 }
 
 fn recipe(speed: f64) -> Recipe {
-    let world = World {
-        body: ball(RADIUS),
-        obstacles: vec![ground()],
-    };
     let height = |z: f64| Vector3::new(0.0, 0.0, RADIUS + z);
     let path = Path::from(height(FROM))
         .to(height(TURN), speed)
         .to(height(END), speed)
         .hold(0.05);
-    let scene = Scene::new(world, 2.0 * RADIUS, speed, path.pose(0.0));
+    let scene = Scene::new(
+        ball(RADIUS),
+        [ground()],
+        2.0 * RADIUS,
+        speed,
+        path.pose(0.0),
+    );
     let stiffness = scene.stiffness();
     let ideal = path.clone();
-    let duration = path.duration();
+    let case = ("R11", format!("{speed} m/s"));
+    let about = "late contact: force begins where the hand crosses the surface";
     Recipe {
         ideal: Ideal::closed(move |time| {
             force(0.0, 0.0, stiffness * (RADIUS - ideal.at(time).z).max(0.0))
         }),
         depth: Box::new(|body| (RADIUS - body.translation.z).max(0.0)),
-        astray: Box::new(|_, _| 0.0),
         phases: 20,
-        lines: Box::new(move |_| {
+        lines: sound_and(move |_| {
             let step = stiffness * speed * TICK * (1.0 + ROUNDING);
-            let mut lines = sound();
-            lines.push(Line::at_most(Measure::Step, step));
-            lines.push(Line::at_most(Measure::FirstForceDepth, speed * TICK));
-            lines.push(Line::at_most(Measure::Friction, FRICTION));
-            lines
+            [
+                Measure::Step.at_most(step),
+                Measure::FirstForceDepth.at_most(speed * TICK),
+                Measure::Friction.at_most(FRICTION),
+            ]
         }),
-        ..Recipe::new(
-            ("R11", format!("{speed} m/s")),
-            "late contact: force begins where the hand crosses the surface",
-            scene,
-            duration,
-            move |time| path.pose(time),
-        )
+        ..along(case, about, scene, path)
     }
 }

@@ -1,11 +1,12 @@
 //! R37: a plate rises into a still hand. It must push the body and never pass through it.
 
-use god_object::{Pose, World};
+use god_object::Pose;
 use nalgebra::Point3;
 
 use super::Extent;
 use super::bodies::{block, cube, force, ours_alone, smooth, sound};
 use crate::clock::Tick;
+use crate::measure::{Measure, largest};
 use crate::method::Scene;
 use crate::recipe::{Ideal, Probe, Recipe};
 
@@ -29,12 +30,9 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
 
 fn recipe(extent: Extent, thickness: f64) -> Recipe {
     let low = Point3::new(-0.1, -0.1, -thickness);
-    let world = World {
-        body: cube(HALF),
-        obstacles: vec![block("plate", low, Point3::new(0.1, 0.1, 0.0))],
-    };
     let still = Pose::translation(0.0, 0.0, HAND);
-    let scene = Scene::new(world, 2.0 * HALF, SPEED, still);
+    let plate = block("plate", low, Point3::new(0.1, 0.1, 0.0));
+    let scene = Scene::new(cube(HALF), [plate], 2.0 * HALF, SPEED, still);
     let stiffness = scene.stiffness();
     let top = |time: f64| (SPEED * time).min(RISE);
     let end = RISE / SPEED + WAIT;
@@ -42,8 +40,7 @@ fn recipe(extent: Extent, thickness: f64) -> Recipe {
     let about = "moving obstacle: pushes the body, never passes it";
     let passed = move |ticks: &[Tick]| {
         let late = ticks.iter().filter(|tick| tick.time > end - AT_REST);
-        late.map(|tick| (RISE + HALF - tick.body.translation.z).max(0.0))
-            .fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+        largest(late.map(|tick| (RISE + HALF - tick.body.translation.z).max(0.0)))
     };
     Recipe {
         ideal: Ideal::closed(move |time| {
@@ -53,7 +50,7 @@ fn recipe(extent: Extent, thickness: f64) -> Recipe {
         lines: Box::new(move |_| {
             // Intersections are not looked for where obstacles move: the probe does it.
             let mut lines = sound();
-            lines.retain(|line| line.measure != crate::measure::Measure::Intersections);
+            lines.retain(|line| line.measure != Measure::Intersections);
             lines.push(smooth(stiffness, SPEED));
             lines
         }),

@@ -2,18 +2,18 @@
 
 use std::f64::consts::TAU;
 
+use god_object::Pose;
 use god_object::spatial::angular;
-use god_object::{Pose, World};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use taut_method_tests::machined::Thread;
 use taut_method_tests::solids::{body, mesh, obstacle};
 
 use super::Extent;
-use super::bodies::{force, largest_from, sound, turns};
+use super::bodies::{force, largest_from, sound_and, turns};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Probe, Recipe};
+use crate::recipe::{Ideal, Probe, Recipe};
 
 const CLEARANCE: f64 = 0.2e-3;
 /// Turns a second.
@@ -34,10 +34,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         pitch: 1.5e-3,
         facets,
     };
-    let world = World {
-        body: body(mesh(thread.nut(2, CLEARANCE, 8e-3))),
-        obstacles: vec![obstacle("bolt", mesh(thread.bolt(7)), Pose::identity())],
-    };
+    let obstacles = [obstacle("bolt", mesh(thread.bolt(7)), Pose::identity())];
     let pitch = thread.pitch;
     // The hand comes down to its place behind the flank, then turns.
     let coming = 0.05;
@@ -51,7 +48,8 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             ),
         )
     };
-    let scene = Scene::new(world, 0.016, TAU * RATE * 5e-3, device(0.0));
+    let nut = body(mesh(thread.nut(2, CLEARANCE, 8e-3)));
+    let scene = Scene::new(nut, obstacles, 0.016, TAU * RATE * 5e-3, device(0.0));
     let stiffness = scene.stiffness();
     let play = CLEARANCE / Thread::SLOPE;
     let case = ("R26", format!("M10 nut, {facets} facets a turn"));
@@ -61,11 +59,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             let behind = BEHIND * (time / coming).min(1.0);
             force(0.0, 0.0, stiffness * (behind - play).max(0.0))
         }),
-        lines: Box::new(|_| {
-            let mut lines = sound();
-            lines.push(Line::at_most(Measure::ForceP95, FORCE_ERROR));
-            lines
-        }),
+        lines: sound_and(|_| [Measure::ForceP95.at_most(FORCE_ERROR)]),
         probes: vec![
             Probe {
                 key: "off_the_thread",

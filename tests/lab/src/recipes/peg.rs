@@ -5,18 +5,18 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use god_object::Pose;
 use god_object::spatial::{angular, linear};
-use god_object::{Pose, World};
 use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
 use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::shapes::{Axis, box_with_hole, cylinder};
 
 use super::Extent;
-use super::bodies::{Path, force, ghost_time, largest_from, smooth, sound, turns};
+use super::bodies::{Path, along, force, ghost_time, largest_from, smooth, sound_and, turns};
 use crate::clock::{RATES, TICK};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, OURS, Probe, Recipe, open_for};
+use crate::recipe::{Ideal, OURS, Probe, Recipe, open_for};
 
 const SIDES: usize = 72;
 const RADIUS: f64 = 0.01;
@@ -52,12 +52,11 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     recipes
 }
 
-fn world(clearance: f64) -> World {
+fn scene(clearance: f64, start: Pose) -> Scene {
+    let peg = body(mesh(cylinder(RADIUS, HALF, SIDES, Axis::Y)));
     let hole = box_with_hole([HALF; 3], RADIUS + clearance, SIDES, Axis::Y);
-    World {
-        body: body(mesh(cylinder(RADIUS, HALF, SIDES, Axis::Y))),
-        obstacles: vec![obstacle("box", mesh(hole), Pose::identity())],
-    }
+    let hole = obstacle("box", mesh(hole), Pose::identity());
+    Scene::new(peg, [hole], 2.0 * HALF, SPEED, start)
 }
 
 /// The place nearest to `place` in a regular polygon about the origin, one side towards the first axis.
@@ -92,7 +91,7 @@ fn pushed(extent: Extent, clearance: f64) -> Recipe {
         let (across, along) = place(time);
         Pose::translation(across.x, along, across.y)
     };
-    let scene = Scene::new(world(clearance), 2.0 * HALF, SPEED, device(0.0));
+    let scene = scene(clearance, device(0.0));
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
     let case = (
         "R18",
@@ -106,14 +105,14 @@ fn pushed(extent: Extent, clearance: f64) -> Recipe {
             force(push.x, 0.0, push.y)
         }),
         phases: extent.choose(5, 1),
-        lines: Box::new(move |rate| {
+        lines: sound_and(move |rate| {
             let stale = FRAC_PI_2 / TURNING * (ghost_time(k_s, rate) + TICK);
-            let mut lines = sound();
-            lines.push(smooth(stiffness, SPEED.max(OFFSET * FRAC_PI_2 / TURNING)));
             let direction = FACET + stale.to_degrees();
-            lines.push(Line::at_most(Measure::DirectionMax, direction));
-            lines.push(Line::at_most(Measure::MagnitudeP95, MAGNITUDE));
-            lines
+            [
+                smooth(stiffness, SPEED.max(OFFSET * FRAC_PI_2 / TURNING)),
+                Measure::DirectionMax.at_most(direction),
+                Measure::MagnitudeP95.at_most(MAGNITUDE),
+            ]
         }),
         probes: vec![
             Probe::at_most(
@@ -151,7 +150,7 @@ fn tilted(extent: Extent) -> Recipe {
             UnitQuaternion::from_scaled_axis(Vector3::z() * turned),
         )
     };
-    let scene = Scene::new(world(CLEARANCE), 2.0 * HALF, SPEED, device(0.0));
+    let scene = scene(CLEARANCE, device(0.0));
     let k_s = scene.settings.k_s;
     let case = ("R19", "pulled out askew".to_owned());
     let about = "tilt jam: without friction it slides out";
@@ -159,11 +158,7 @@ fn tilted(extent: Extent) -> Recipe {
     Recipe {
         ideal: Ideal::Oracle,
         phases: extent.choose(5, 1),
-        lines: Box::new(|_| {
-            let mut lines = sound();
-            lines.push(Line::at_most(Measure::ForceP95, 0.05));
-            lines
-        }),
+        lines: sound_and(|_| [Measure::ForceP95.at_most(0.05)]),
         probes: vec![Probe {
             key: "lag_along_hole",
             unit: "m",
@@ -195,24 +190,17 @@ fn inserted() -> Recipe {
         .hold(0.2)
         .to(at(-1e-3, top - 0.05), SPEED)
         .hold(0.1);
-    let scene = Scene::new(world(CLEARANCES[0]), 2.0 * HALF, SPEED, path.pose(0.0));
+    let scene = scene(CLEARANCES[0], path.pose(0.0));
     let case = ("R18", "onto the face and in".to_owned());
     let about = "peg in hole: slid over the face, inserted, pushed to the other side";
-    let duration = path.duration();
+    let missed = [Measure::JndP95, Measure::JndShare, Measure::ForceP95];
     Recipe {
         ideal: Ideal::Oracle,
-        lines: Box::new(|_| {
-            let mut lines = sound();
-            lines.push(Line::at_most(Measure::ForceP95, 0.1));
-            lines
-        }),
+        lines: sound_and(|_| [Measure::ForceP95.at_most(0.1)]),
         check_every: 5,
         out_of_scope: turns,
-        open: [Measure::JndP95, Measure::JndShare, Measure::ForceP95]
-            .iter()
-            .flat_map(|line| open_for(OURS, &RATES, line.key(), AT_THE_RIM))
-            .collect(),
-        ..Recipe::new(case, about, scene, duration, move |time| path.pose(time))
+        open: open_for(OURS, &RATES, &missed, AT_THE_RIM),
+        ..along(case, about, scene, path)
     }
 }
 

@@ -1,13 +1,12 @@
 //! R02: a ball is pushed on a plane, slid along it and lifted while it slides. A force along the plane is artificial friction.
 
-use god_object::World;
 use nalgebra::Vector3;
 
 use super::Extent;
-use super::bodies::{Path, ball, force, ground, smooth, sound};
+use super::bodies::{Path, along, ball, force, ground, smooth, sound_and};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Recipe};
 
 const RADIUS: f64 = 0.01;
 const DEPTH: f64 = 5e-3;
@@ -17,10 +16,6 @@ const LIFT_SPEED: f64 = 0.05;
 const FRICTION: f64 = 1e-9;
 
 pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
-    let world = World {
-        body: ball(RADIUS),
-        obstacles: vec![ground()],
-    };
     let height = |z: f64| Vector3::new(0.0, 0.0, RADIUS + z);
     let slid = Vector3::new(0.1, 0.0, 0.0);
     // Up at the speed of lifting while it still slides.
@@ -32,35 +27,24 @@ pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
         .to(height(-DEPTH) + slid, SLIDE_SPEED)
         .to(height(-DEPTH) + lifted, SLIDE_SPEED.hypot(LIFT_SPEED))
         .hold(0.1);
-    let scene = Scene::new(
-        world,
-        2.0 * RADIUS,
-        SLIDE_SPEED.hypot(LIFT_SPEED),
-        path.pose(0.0),
-    );
+    let (size, speed) = (2.0 * RADIUS, SLIDE_SPEED.hypot(LIFT_SPEED));
+    let scene = Scene::new(ball(RADIUS), [ground()], size, speed, path.pose(0.0));
     let stiffness = scene.stiffness();
     let ideal = path.clone();
-    let duration = path.duration();
+    let case = ("R02", "ball on a plane".into());
+    let about = "push, slide, lift: no artificial friction";
     vec![Recipe {
         ideal: Ideal::closed(move |time| {
             force(0.0, 0.0, stiffness * (RADIUS - ideal.at(time).z).max(0.0))
         }),
         depth: Box::new(|body| (RADIUS - body.translation.z).max(0.0)),
-        astray: Box::new(|_, _| 0.0),
-        phases: 1,
-        lines: Box::new(move |_| {
-            let mut lines = sound();
-            lines.push(smooth(stiffness, SLIDE_SPEED));
-            lines.push(Line::at_most(Measure::Friction, FRICTION));
-            lines.push(Line::at_most(Measure::FalseForce, 0.0));
-            lines
+        lines: sound_and(move |_| {
+            [
+                smooth(stiffness, SLIDE_SPEED),
+                Measure::Friction.at_most(FRICTION),
+                Measure::FalseForce.at_most(0.0),
+            ]
         }),
-        ..Recipe::new(
-            ("R02", "ball on a plane".into()),
-            "push, slide, lift: no artificial friction",
-            scene,
-            duration,
-            move |time| path.pose(time),
-        )
+        ..along(case, about, scene, path)
     }]
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use god_object::spatial::linear;
-use god_object::{ForceShading, Pose, World};
+use god_object::{ForceShading, Pose};
 
 use super::Extent;
 use super::bodies::{ball, does_not_shade, force, sound};
@@ -75,8 +75,7 @@ impl Turns {
 
     fn device(self, time: f64) -> Pose {
         let (depth, angle, _) = self.place(time);
-        let at = out(angle) * (RADIUS + TIP - depth);
-        Pose::translation(at.x, at.y, at.z)
+        Pose::from(out(angle) * (RADIUS + TIP - depth))
     }
 
     /// The most that the hand gets out of a turn, J.
@@ -108,13 +107,9 @@ impl Turns {
 fn recipe(extent: Extent, shaded: bool) -> Recipe {
     let mut round = PRISM.obstacle(0.05);
     round.surface.shading = shaded.then_some(ForceShading { crease_angle: 1.0 });
-    let world = World {
-        body: ball(TIP),
-        obstacles: vec![round],
-    };
     let turns = Turns::new(extent.choose(10, 1));
     let device = move |time: f64| turns.device(time);
-    let scene = Scene::new(world, 2.0 * TIP, SPEED, device(0.0));
+    let scene = Scene::new(ball(TIP), [round], 2.0 * TIP, SPEED, device(0.0));
     let stiffness = scene.stiffness();
     let most = move |ticks: &[Tick]| turns.most_work(ticks);
     let mean = move |ticks: &[Tick]| turns.error_of_mean(stiffness, ticks);
@@ -147,7 +142,7 @@ fn recipe(extent: Extent, shaded: bool) -> Recipe {
 
 fn open() -> Vec<Open> {
     let reason = "the force turns by 11 degrees at a corner, an update after the right answer does; there is a corner in 19 ms";
-    let mut open = open_for(OURS, &[70, 300], Measure::JndP95.key(), reason);
-    open.extend(open_for(OURS, &[70], Measure::JndShare.key(), reason));
+    let mut open = open_for(OURS, &[70, 300], &[Measure::JndP95], reason);
+    open.extend(open_for(OURS, &[70], &[Measure::JndShare], reason));
     open
 }

@@ -1,16 +1,16 @@
 //! R10b: a thin bar spins past a pin, a third of a radian between updates at 70 Hz. It stops at first contact.
 
-use god_object::{Pose, Primitive, World};
+use god_object::{Pose, Primitive};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::shapes::{Axis, cuboid, cylinder};
 
 use super::Extent;
-use super::bodies::{sound, turns};
+use super::bodies::{sound_and, turns};
 use crate::clock::RATES;
 use crate::measure::Measure;
 use crate::method::{Method, Scene};
-use crate::recipe::{Ideal, Line, Recipe, open_for};
+use crate::recipe::{Ideal, Recipe, open_for};
 
 /// Of the bar, m.
 const HALF: [f64; 3] = [0.1, 1e-3, 1e-3];
@@ -38,10 +38,6 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         ends: [-0.02, 0.02].map(|z| Point3::new(0.0, 0.0, z)),
         radius: PIN,
     });
-    let world = World {
-        body: body(mesh(cuboid(HALF))),
-        obstacles: vec![pin],
-    };
     let device = |time: f64| {
         let turned = (SPIN * time).min(ANGLE + BEYOND);
         Pose::from_parts(
@@ -49,7 +45,8 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             UnitQuaternion::from_scaled_axis(Vector3::z() * turned),
         )
     };
-    let scene = Scene::new(world, 2.0 * HALF[0], SPIN * HALF[0], device(0.0));
+    let bar = body(mesh(cuboid(HALF)));
+    let scene = Scene::new(bar, [pin], 2.0 * HALF[0], SPIN * HALF[0], device(0.0));
     // The pin in the bar's frame.
     let seen = move |bar: &Pose| {
         let pin = bar.inverse_transform_point(&at);
@@ -82,15 +79,11 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             }
         }),
         phases: extent.choose(20, 4),
-        lines: Box::new(|_| {
-            let mut lines = sound();
-            lines.push(Line::at_most(Measure::Astray, ASTRAY));
-            lines
-        }),
+        lines: sound_and(|_| [Measure::Astray.at_most(ASTRAY)]),
         open: open_for(
             &[Method::OursByDefault],
             &RATES,
-            Measure::Astray.key(),
+            &[Measure::Astray],
             "by default it comes to rest at a distance that grows with the body: 20 um for one of 0.2 m",
         ),
         out_of_scope: turns,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use god_object::spatial::linear;
-use god_object::{GodObject, Pose, StartError, World};
+use god_object::{GodObject, Pose, StartError};
 
 use super::Extent;
 use super::bodies::{cube, ground};
@@ -17,12 +17,8 @@ const INSIDE: f64 = 5e-3;
 const RAMP: f64 = 1.0;
 
 pub(super) fn run(_extent: Extent) -> Vec<Row> {
-    let world = World {
-        body: cube(HALF),
-        obstacles: vec![ground()],
-    };
     let inside = Pose::translation(0.0, 0.0, HALF - INSIDE);
-    let scene = Scene::new(world, 2.0 * HALF, 0.1, inside);
+    let scene = Scene::new(cube(HALF), [ground()], 2.0 * HALF, 0.1, inside);
     let refused = GodObject::new(Arc::clone(&scene.world), scene.settings, inside).err();
     let named = |error: &StartError| matches!(error, StartError::Penetration { obstacle } if obstacle == "ground");
     let wrong = !refused.as_ref().is_some_and(named);

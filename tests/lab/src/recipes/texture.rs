@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use god_object::spatial::linear;
-use god_object::{SineTexture, Texture, World};
+use god_object::{SineTexture, Texture};
 use nalgebra::Vector3;
 
 use super::Extent;
-use super::bodies::{Path, ball, ground, ours_alone, sound};
+use super::bodies::{Path, along, ball, ground, ours_alone, sound};
 use crate::clock::{TICK, Tick};
 use crate::method::{Method, Scene};
 use crate::recipe::{Probe, Recipe};
@@ -32,20 +32,15 @@ pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
         wavelength: WAVELENGTH,
         amplitude: 0.2,
     }));
-    let world = World {
-        body: ball(RADIUS),
-        obstacles: vec![table],
-    };
     let at = |x: f64, z: f64| Vector3::new(x, 0.0, RADIUS + z);
     let path = Path::from(at(-0.05, 1e-3))
         .to(at(-0.05, -DEPTH), 0.05)
         .hold(0.05)
         .to(at(0.05, -DEPTH), SPEED);
     let (from, to) = (path.duration() - 0.4, path.duration());
-    let scene = Scene::new(world, 2.0 * RADIUS, SPEED, path.pose(0.0));
+    let scene = Scene::new(ball(RADIUS), [table], 2.0 * RADIUS, SPEED, path.pose(0.0));
     let case = ("R29", "sine of 1 mm at 0.2 m/s".to_owned());
     let about = "texture: one tone and no alias";
-    let duration = path.duration();
     vec![Recipe {
         lines: Box::new(|_| sound()),
         probes: vec![Probe::at_most(
@@ -58,7 +53,7 @@ pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
             Method::Paper | Method::PaperAdapted => None,
             _ => ours_alone(method, "it has no textures"),
         },
-        ..Recipe::new(case, about, scene, duration, move |time| path.pose(time))
+        ..along(case, about, scene, path)
     }]
 }
 

@@ -1,13 +1,12 @@
 //! R09: a small cube is pushed at a thin plate by a device that goes through it, stays below, slides there and comes back.
 
-use god_object::World;
 use nalgebra::{Point3, Vector3};
 
 use super::Extent;
-use super::bodies::{Path, block, cube, cube_mesh, force, smooth, sound};
+use super::bodies::{Path, along, block, cube, cube_mesh, force, smooth, sound_and};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Recipe};
 use crate::vertex_depth::Convex;
 
 const HALF: f64 = 0.5e-3;
@@ -25,10 +24,6 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
 fn recipe(extent: Extent, thickness: f64) -> Recipe {
     let low = Point3::new(-0.1, -0.1, -thickness);
     let high = Point3::new(0.1, 0.1, 0.0);
-    let world = World {
-        body: cube(HALF),
-        obstacles: vec![block("plate", low, high)],
-    };
     let at = |x: f64, z: f64| Vector3::new(x, 0.0, z);
     let path = Path::from(at(0.0, REACH))
         .to(at(0.0, -REACH), SPEED)
@@ -36,11 +31,13 @@ fn recipe(extent: Extent, thickness: f64) -> Recipe {
         .to(at(REACH, -REACH), SPEED)
         .to(at(-REACH, -REACH), SPEED)
         .to(at(-REACH, REACH), SPEED);
-    let scene = Scene::new(world, 2.0 * HALF, SPEED, path.pose(0.0));
+    let plate = block("plate", low, high);
+    let scene = Scene::new(cube(HALF), [plate], 2.0 * HALF, SPEED, path.pose(0.0));
     let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
     let ideal = path.clone();
     let (plate, body) = (Convex::cuboid(low, high), cube_mesh(HALF));
-    let duration = path.duration();
+    let case = ("R09", format!("plate of {} mm", thickness * 1e3));
+    let about = "thin plate: no pop-through";
     Recipe {
         ideal: Ideal::closed(move |time| {
             let depth = (HALF - ideal.at(time).z).max(0.0);
@@ -49,19 +46,13 @@ fn recipe(extent: Extent, thickness: f64) -> Recipe {
         depth: Box::new(move |pose| plate.deepest(&body, pose)),
         astray: Box::new(|_, body| (HALF - body.translation.z).max(0.0)),
         phases: extent.choose(20, 4),
-        lines: Box::new(move |_| {
-            let mut lines = sound();
-            lines.push(smooth(stiffness, SPEED));
-            lines.push(Line::at_most(Measure::Astray, ASTRAY));
-            lines.push(Line::at_most(Measure::FalseForce, 0.0));
-            lines
+        lines: sound_and(move |_| {
+            [
+                smooth(stiffness, SPEED),
+                Measure::Astray.at_most(ASTRAY),
+                Measure::FalseForce.at_most(0.0),
+            ]
         }),
-        ..Recipe::new(
-            ("R09", format!("plate of {} mm", thickness * 1e3)),
-            "thin plate: no pop-through",
-            scene,
-            duration,
-            move |time| path.pose(time),
-        )
+        ..along(case, about, scene, path)
     }
 }

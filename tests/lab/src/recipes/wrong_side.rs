@@ -1,15 +1,15 @@
 //! R28: a ball in a U with walls of a millimetre. The device goes through a wall, stays there, then walks round the open end.
 
-use god_object::{Pose, World};
+use god_object::Pose;
 use nalgebra::{Point3, Vector3};
 use taut_method_tests::solids::{cells, mesh, obstacle};
 
 use super::Extent;
-use super::bodies::{Path, ball, force, ghost_time, sound};
+use super::bodies::{Path, along, ball, force, ghost_time, sound_and};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, OURS, Recipe, STANDS_ASIDE, open_for};
+use crate::recipe::{Ideal, OURS, Recipe, STANDS_ASIDE, open_for};
 
 const RADIUS: f64 = 4e-3;
 /// Inner and outer face of the walls, and their upper end, m.
@@ -28,22 +28,20 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         [&planes_x, &[-0.05, 0.05], &[-0.001, 0.0, RIM]],
         |[i, _, k]| k == 0 || i != 1,
     );
-    let world = World {
-        body: ball(RADIUS),
-        obstacles: vec![obstacle("u", mesh(u_shape), Pose::identity())],
-    };
     let at = |x: f64, z: f64| Vector3::new(x, 0.0, z);
     let path = Path::from(at(0.0, 0.03))
         .to(at(0.045, 0.03), SPEED)
         .hold(extent.choose(2.0, 0.2))
         .to(at(0.045, 0.13), SPEED)
         .hold(0.2);
-    let scene = Scene::new(world, 2.0 * RADIUS, SPEED, path.pose(0.0));
+    let u_shape = obstacle("u", mesh(u_shape), Pose::identity());
+    let scene = Scene::new(ball(RADIUS), [u_shape], 2.0 * RADIUS, SPEED, path.pose(0.0));
     let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
     let k_s = scene.settings.k_s;
     let ideal = path.clone();
     let device = path.clone();
-    let duration = path.duration();
+    let case = ("R28", "wall of a U".into());
+    let about = "wrong side: the body stays on its side until the way is free";
     vec![Recipe {
         ideal: Ideal::closed(move |time| {
             // The ball slides up the wall and, once its centre is above the rim, round it.
@@ -73,21 +71,15 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             if held { beyond } else { 0.0 }
         }),
         phases: extent.choose(20, 4),
-        lines: Box::new(move |rate| {
-            let mut lines = sound();
-            lines.push(Line::at_most(Measure::Astray, ASTRAY));
+        lines: sound_and(move |rate| {
             // It points back all the time that the wall is between them, and no longer.
             let late = ghost_time(k_s, rate) + TICKS * TICK;
-            lines.push(Line::at_most(Measure::FalseForce, late));
-            lines
+            [
+                Measure::Astray.at_most(ASTRAY),
+                Measure::FalseForce.at_most(late),
+            ]
         }),
-        open: open_for(OURS, &[300], Measure::JndShare.key(), STANDS_ASIDE),
-        ..Recipe::new(
-            ("R28", "wall of a U".into()),
-            "wrong side: the body stays on its side until the way is free",
-            scene,
-            duration,
-            move |time| path.pose(time),
-        )
+        open: open_for(OURS, &[300], &[Measure::JndShare], STANDS_ASIDE),
+        ..along(case, about, scene, path)
     }]
 }

@@ -2,7 +2,7 @@
 //!
 //! The right answer is that of the exact ball, and that of the finest bunny: what is charted is what a level costs of it.
 
-use god_object::{Pose, World};
+use god_object::Pose;
 use nalgebra::Vector3;
 use taut_method_tests::solids::{mesh, obstacle};
 use taut_scene::shapes::sphere;
@@ -48,10 +48,6 @@ fn cases(extent: Extent) -> Vec<Case> {
 fn round_a_ball(subdivisions: u32) -> Case {
     let raw = sphere(LARGE, subdivisions);
     let label = format!("ball of {} triangles", raw.triangles.len());
-    let world = World {
-        body: ball(SMALL),
-        obstacles: vec![obstacle("ball", mesh(raw), Pose::identity())],
-    };
     // Depth, and the direction in which the hand is.
     let place = |time: f64| {
         let t = (time / PRESS).clamp(0.0, 1.0);
@@ -62,10 +58,10 @@ fn round_a_ball(subdivisions: u32) -> Case {
     };
     let device = move |time: f64| {
         let (depth, out) = place(time);
-        let at = out * (SMALL + LARGE - depth);
-        Pose::translation(at.x, at.y, at.z)
+        Pose::from(out * (SMALL + LARGE - depth))
     };
-    let scene = Scene::new(world, 2.0 * SMALL, SPEED, device(0.0));
+    let large = obstacle("ball", mesh(raw), Pose::identity());
+    let scene = Scene::new(ball(SMALL), [large], 2.0 * SMALL, SPEED, device(0.0));
     let stiffness = scene.stiffness();
     let recipe = Recipe {
         ideal: Ideal::closed(move |time| {
