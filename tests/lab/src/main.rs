@@ -99,7 +99,7 @@ fn measured(path: Option<String>) -> Result<ExitCode, Box<dyn Error>> {
         PathBuf::from,
     );
     let mut all = Vec::new();
-    for method in Method::SIX_DEGREES {
+    for &method in Method::SIX_DEGREES {
         let choice = replay::choose(method)?;
         for trial in replay::TRIALS {
             all.push(replay::replay(trial, method, choice)?);

@@ -9,7 +9,6 @@ use crate::methods::{
     TwoRateLcp, VirtualCoupling,
 };
 pub use crate::tuning::{LinearContacts, ShellForce, ShellPoints, Tuning};
-use crate::tuning::{PROXIES, SHELL_SPACINGS, TOUCH_SHARES};
 
 /// Share of the time between updates that this project's method may spend on looking ahead, and what a pair of triangles takes, nominally, s
 /// ([`Work`](god_object::collision::Work)).
@@ -152,19 +151,8 @@ impl Method {
         Self::Point,
     ];
 
-    /// Those that turn their body: a case that they all have a part in is common.
-    pub const SIX_DEGREES: [Self; 10] = [
-        Self::Ours,
-        Self::OursByDefault,
-        Self::Paper,
-        Self::PaperAdapted,
-        Self::VirtualCoupling,
-        Self::Discrete,
-        Self::Penalty,
-        Self::StaticCoupling,
-        Self::LinearisedPenalty,
-        Self::TwoRateLcp,
-    ];
+    /// Those that turn their body, all but the last: a case that they all have a part in is common.
+    pub const SIX_DEGREES: &[Self] = Self::ALL.split_at(Self::ALL.len() - 1).0;
 
     /// They are no methods: every recipe must fail them.
     pub const CONTROLS: [Self; 2] = [Self::DoesNothing, Self::RandomForce];
@@ -225,7 +213,7 @@ impl Method {
                 };
                 Box::new(GodObjectMethod::new(scene, &paper))
             }
-            Self::VirtualCoupling => Box::new(proxy(scene, period, tuning)),
+            Self::VirtualCoupling => Box::new(VirtualCoupling::new(scene, period, tuning)),
             Self::Discrete => {
                 let (look_ahead_limit, max_substeps) = match tuning {
                     Tuning::Ahead { steps, .. } => (scene.settings.look_ahead_limit, steps),
@@ -238,39 +226,15 @@ impl Method {
                 };
                 Box::new(Discrete::new(scene, &settings))
             }
-            Self::DoesNothing => Box::new(Control::does_nothing(scene)),
-            Self::RandomForce => Box::new(Control::random_force(scene)),
-            Self::Penalty => Box::new(match tuning {
-                Tuning::Shell { force, spacing } => Penalty::new(scene, force, spacing),
-                Tuning::Round(force) => Penalty::round(scene, force),
-                _ => Penalty::new(scene, ShellForce::Deepest, SHELL_SPACINGS[0]),
-            }),
+            Self::DoesNothing => Box::new(Control::new(scene, None)),
+            Self::RandomForce => Box::new(Control::new(scene, Some(1))),
+            Self::Penalty => Box::new(Penalty::new(scene, tuning)),
             Self::StaticCoupling => Box::new(StaticCoupling::new(scene, tuning)),
             Self::LinearisedPenalty => Box::new(LinearisedPenalty::new(scene, tuning)),
             Self::TwoRateLcp => Box::new(TwoRateLcp::new(scene, tuning)),
-            Self::Point => {
-                let share = match tuning {
-                    Tuning::Touch(share) => share,
-                    _ => TOUCH_SHARES[0],
-                };
-                Box::new(PointGodObject::new(scene, share))
-            }
+            Self::Point => Box::new(PointGodObject::new(scene, tuning)),
         }
     }
-}
-
-/// Virtual coupling with this tuning, or its first one.
-fn proxy(scene: &Scene, period: f64, tuning: Tuning) -> VirtualCoupling {
-    let (share, damping_ratio, goes_on) = match tuning {
-        Tuning::Proxy {
-            share,
-            damping_ratio,
-            goes_on,
-        } => (share, damping_ratio, goes_on),
-        _ => (PROXIES[0].0, PROXIES[0].1, false),
-    };
-    let proxy = VirtualCoupling::new(scene, period, share, damping_ratio);
-    if goes_on { proxy.going_on() } else { proxy }
 }
 
 #[cfg(test)]

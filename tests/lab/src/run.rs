@@ -109,7 +109,7 @@ impl Plan {
         }
         let abouts = studies.iter().map(|study| (study.name, study.about));
         results.about.extend(abouts);
-        results.scores = scores(&wanted, &results.outcomes, &Method::SIX_DEGREES);
+        results.scores = scores(&wanted, &results.outcomes, Method::SIX_DEGREES);
         results.port = figures::port_errors(&wanted);
         let mut rest = results.outcomes.as_slice();
         for recipe in wanted {

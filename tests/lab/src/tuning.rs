@@ -17,7 +17,7 @@ const SHORTER_WAY: f64 = 0.5;
 /// Rest distance over the default that this project's method is tried with: a long body rests far from what it touches.
 const NEARER: f64 = 0.25;
 /// Inertias and damping ratios that are tried for virtual coupling. Less inertia than none there is not: the proxy is where the spring is at rest.
-pub(crate) const PROXIES: [(f64, f64); 6] = [
+const PROXIES: [(f64, f64); 6] = [
     (0.02, 1.0),
     (0.1, 1.0),
     (0.1, 0.3),
@@ -42,7 +42,7 @@ const TOOLS: [(f64, f64); 3] = [(0.02, 1.0), (0.005, 0.3), (0.0, 0.0)];
 const CONTACT_DISTANCES: [f64; 3] = [1.0, 10.0, 100.0];
 const ALARM_DISTANCE: f64 = 25.0;
 /// Distances within which the point god-object counts faces as touched that are tried, in rest distances.
-pub(crate) const TOUCH_SHARES: [f64; 6] = [2.0, 10.0, 50.0, 250.0, 1000.0, 4000.0];
+const TOUCH_SHARES: [f64; 6] = [2.0, 10.0, 50.0, 250.0, 1000.0, 4000.0];
 
 impl Method {
     /// The settings among which the best is searched for each recipe and rate; the first is the default.

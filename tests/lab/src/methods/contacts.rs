@@ -7,6 +7,8 @@ use god_object::spatial::{angular, linear, six};
 use god_object::{ConstraintSet, NonPenetrationConstraint, Pose, Settings, Vector6, World};
 use nalgebra::Point3;
 
+/// What an update finds is used from one period after its device pose to two: the device goes on as it came.
+pub(super) const PERIODS_AHEAD: f64 = 2.0;
 /// Bisections of a step that ends in an obstacle: a millimetre is cut down to a nanometre.
 const BISECTIONS: u32 = 20;
 
@@ -43,6 +45,11 @@ impl ContactFinder {
         }
         &self.found
     }
+}
+
+/// Most that a point of a body moves which reaches `radius`, m, from its reference point, m.
+pub(super) fn longest_way(motion: &Vector6, radius: f64) -> f64 {
+    linear(motion).norm() + radius * angular(motion).norm()
 }
 
 /// Share of a motion of the body, m long at its farthest point, that ends free of the obstacles: all of it, or as much as bisection finds. What lies on the

@@ -7,31 +7,21 @@ use crate::method::{HapticMethod, Scene};
 /// Largest random force along an axis, N, and torque about one, N m.
 const FORCE: f64 = 1.0;
 const TORQUE: f64 = 0.05;
-/// Of the random wrenches.
-const SEED: u64 = 1;
 
 /// A body that stays where it started, with a wrench that has nothing to do with the scene.
 #[derive(Debug)]
 pub struct Control {
     pose: Pose,
-    /// State of the generator; `None`: no force at all.
+    /// State of the generator.
     random: Option<u64>,
 }
 
 impl Control {
-    /// Never moves, and gives no force.
-    pub fn does_nothing(scene: &Scene) -> Self {
+    /// Never moves. With a seed another force and torque every millisecond, the same in every run; else none.
+    pub(crate) fn new(scene: &Scene, random: Option<u64>) -> Self {
         Self {
             pose: scene.start,
-            random: None,
-        }
-    }
-
-    /// Never moves, and gives another force and torque every millisecond, the same in every run.
-    pub fn random_force(scene: &Scene) -> Self {
-        Self {
-            pose: scene.start,
-            random: Some(SEED),
+            random,
         }
     }
 }

@@ -11,16 +11,15 @@ use std::sync::Arc;
 use god_object::constraint::Contact;
 use god_object::quasi_statics::{HalfSpace, Projector};
 use god_object::spatial::{
-    advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference,
+    advance_pose, angular, at_reference_point, from_reference_point, pose_difference,
 };
 use god_object::{ConstraintSet, Coupling, Pose, Settings, SolverKind, Vector6, World};
 use nalgebra::{Point3, Vector3};
 
-use super::contacts::{ContactFinder, constraint_set, free_share, project};
+use super::contacts::{
+    ContactFinder, PERIODS_AHEAD, constraint_set, free_share, longest_way, project,
+};
 use crate::method::{HapticMethod, Scene};
-
-/// A set is used from one period after its device pose to two: the device goes on as it came.
-const PERIODS_AHEAD: f64 = 2.0;
 
 /// The method's state.
 #[derive(Debug)]
@@ -81,11 +80,6 @@ impl Discrete {
         self.set = constraint_set(sequence, &self.pose, found, settings.max_constraints);
     }
 
-    /// Most that a point of the body moves, m.
-    fn length(&self, motion: &Vector6) -> f64 {
-        linear(motion).norm() + self.radius * angular(motion).norm()
-    }
-
     /// Goes where the contacts lead a motion of the reference point, as far as it is free there. How far the body went, m.
     fn step(&mut self, wish: &Vector6) -> f64 {
         let body = &self.world.body;
@@ -103,7 +97,7 @@ impl Discrete {
             let pose = advance_pose(&start, &step, share);
             from_reference_point(&pose, &body.reference_point)
         };
-        let length = self.length(&step);
+        let length = longest_way(&step, self.radius);
         let free = free_share(&self.world, length, at);
         if free > 0.0 {
             self.pose = at(free);
@@ -118,7 +112,8 @@ impl HapticMethod for Discrete {
         let start = at_reference_point(&self.pose, &reference);
         let device = at_reference_point(device, &reference);
         let last = self.last_device.replace(device).unwrap_or(device);
-        let moved = self.length(&pose_difference(&device, &last, &Vector3::zeros()));
+        let moved = pose_difference(&device, &last, &Vector3::zeros());
+        let moved = longest_way(&moved, self.radius);
         let difference = pose_difference(&device, &start, &self.turn);
         self.turn = angular(&difference);
         let sequence = self.set.sequence + 1;
@@ -129,7 +124,7 @@ impl HapticMethod for Discrete {
             if step > 0 {
                 let here = at_reference_point(&self.pose, &reference);
                 left = pose_difference(&goal, &here, &angular(&left));
-                self.collect(sequence, self.length(&left));
+                self.collect(sequence, longest_way(&left, self.radius));
             }
             let way = self.step(&left);
             went += way;

@@ -23,12 +23,12 @@ use std::sync::Arc;
 use god_object::collision::surfaces_intersect;
 use god_object::geometry::Primitive;
 use god_object::spatial::{
-    advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference,
+    advance_pose, angular, at_reference_point, from_reference_point, pose_difference,
 };
 use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Matrix6, Vector3};
 
-use super::contacts::ContactFinder;
+use super::contacts::{ContactFinder, PERIODS_AHEAD, longest_way};
 use super::point_shell::PointShell;
 use super::saturating_spring::{mass_matrix, on_hand};
 use super::settle::{Spring, settle};
@@ -37,9 +37,6 @@ use super::virtual_coupling::device_velocity;
 use crate::clock::TICK;
 use crate::method::{HapticMethod, Method, Scene};
 use crate::tuning::{LinearContacts, SHELL_SPACINGS, ShellPoints, Tuning};
-
-/// Contacts are used from one period after their device pose to two: the device goes on as it came.
-const PERIODS_AHEAD: f64 = 2.0;
 
 /// What an update found.
 #[derive(Clone, Debug)]
@@ -215,7 +212,7 @@ impl HapticMethod for LinearisedPenalty {
         let device = at_reference_point(device, &self.world.body.reference_point);
         let last = std::mem::replace(&mut self.last_device, device);
         let moved = pose_difference(&device, &last, &Vector3::zeros());
-        let moved = linear(&moved).norm() + self.radius * angular(&moved).norm();
+        let moved = longest_way(&moved, self.radius);
         self.look(self.offset + self.settings.activation_distance + PERIODS_AHEAD * moved);
     }
 
@@ -263,24 +260,16 @@ impl HapticMethod for LinearisedPenalty {
 
 #[cfg(test)]
 mod tests {
+    use god_object::spatial::linear;
+
+    use super::super::above_a_plate::{at, scene};
     use super::*;
-    use crate::recipes::{block, cube};
-
-    /// A cube of 10 mm above a plate.
-    fn scene() -> Scene {
-        let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        Scene::new(cube(0.005), [plate], 0.01, 0.1, at(0.001))
-    }
-
-    fn at(height: f64) -> Pose {
-        Pose::translation(0.0, 0.0, 0.005 + height)
-    }
+    use crate::recipes::cube;
 
     /// Comes down to -1 mm in 100 ms and stays for as long, with an update every `every` ms; the last force,
     /// and how far out of the plate the tool is.
     fn pressed(tuning: Tuning, every: u32) -> (f64, f64) {
-        let scene = scene();
-        let mut method = LinearisedPenalty::new(&scene, tuning);
+        let mut method = LinearisedPenalty::new(&scene(cube(0.005), 0.001), tuning);
         let mut last = 0.0;
         for tick in 0..200 {
             let time = f64::from(tick) * TICK;
@@ -317,9 +306,8 @@ mod tests {
             stiffness: 1e3,
             contacts,
         };
-        let scene = scene();
         let lifted = |contacts| {
-            let mut method = LinearisedPenalty::new(&scene, tool(contacts));
+            let mut method = LinearisedPenalty::new(&scene(cube(0.005), 0.001), tool(contacts));
             for tick in 0..200 {
                 let time = f64::from(tick) * TICK;
                 let device = at(if tick < 150 { -0.001 } else { 0.001 });

@@ -1,5 +1,7 @@
 //! The methods, each in a file; the baselines live here alone.
 
+#[cfg(test)]
+mod above_a_plate;
 mod contacts;
 mod controls;
 mod discrete;

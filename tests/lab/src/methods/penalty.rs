@@ -9,16 +9,14 @@
 use std::sync::Arc;
 
 use god_object::geometry::Primitive;
-use god_object::spatial::{angular, at_reference_point, linear, pose_difference, six};
+use god_object::spatial::{at_reference_point, pose_difference, six};
 use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Point3, Vector3};
 
-use super::contacts::limited;
+use super::contacts::{PERIODS_AHEAD, limited, longest_way};
 use super::shell::{DistanceField, nearest_on_obstacle, points};
-use crate::method::{HapticMethod, Scene, ShellForce};
-
-/// Points are used from one period after their device pose to two: the device goes on as it came.
-const PERIODS_AHEAD: f64 = 2.0;
+use crate::method::{HapticMethod, Method, Scene};
+use crate::tuning::{ShellForce, Tuning};
 
 /// A point of the shell, or a ball.
 #[derive(Clone, Copy, Debug)]
@@ -63,30 +61,28 @@ pub struct Penalty {
 }
 
 impl Penalty {
-    /// At the scene's start. `spacing`: between points, over the body's longest side; infinite: its vertices alone.
-    pub fn new(scene: &Scene, shell_force: ShellForce, spacing: f64) -> Self {
-        let mesh = &scene.world.body.mesh;
-        let [low, high] = mesh.bounding_box();
-        let points = points(mesh, spacing * (high - low).amax());
-        let place = |center| Place {
-            center,
-            radius: 0.0,
+    /// At the scene's start. A tuning that is not of this method is its first one.
+    pub(crate) fn new(scene: &Scene, tuning: Tuning) -> Self {
+        let (shell_force, spacing) = match tuning {
+            Tuning::Shell { force, spacing } => (force, spacing),
+            Tuning::Round(force) => (force, f64::INFINITY),
+            _ => return Self::new(scene, Method::Penalty.tunings()[0]),
         };
-        Self::with(scene, shell_force, points.into_iter().map(place).collect())
-    }
-
-    /// The same with one point for a body that is a ball, and with the vertices of any other.
-    pub fn round(scene: &Scene, shell_force: ShellForce) -> Self {
-        match scene.world.body.primitive {
-            Some(Primitive::Sphere { center, radius }) => {
-                Self::with(scene, shell_force, vec![Place { center, radius }])
-            }
-            _ => Self::new(scene, shell_force, f64::INFINITY),
-        }
-    }
-
-    fn with(scene: &Scene, shell_force: ShellForce, shell: Vec<Place>) -> Self {
         let mesh = &scene.world.body.mesh;
+        let shell = match (tuning, scene.world.body.primitive) {
+            (Tuning::Round(_), Some(Primitive::Sphere { center, radius })) => {
+                vec![Place { center, radius }]
+            }
+            _ => {
+                let [low, high] = mesh.bounding_box();
+                let points = points(mesh, spacing * (high - low).amax());
+                let place = |center| Place {
+                    center,
+                    radius: 0.0,
+                };
+                points.into_iter().map(place).collect()
+            }
+        };
         let obstacles = scene.world.obstacles.iter();
         let free = Found {
             pose: scene.start,
@@ -137,7 +133,7 @@ impl HapticMethod for Penalty {
         let reference = &self.world.body.reference_point;
         let [to, from] = [device, &self.now.pose].map(|pose| at_reference_point(pose, reference));
         let moved = pose_difference(&to, &from, &Vector3::zeros());
-        let moved = linear(&moved).norm() + self.radius * angular(&moved).norm();
+        let moved = longest_way(&moved, self.radius);
         self.now.pose = *device;
         self.now.near.clear();
         for place in &self.shell {
@@ -171,52 +167,35 @@ impl HapticMethod for Penalty {
 #[cfg(test)]
 mod tests {
     use god_object::Body;
+    use god_object::spatial::linear;
 
+    use super::super::above_a_plate::{at, scene};
     use super::*;
-    use crate::recipes::{ball, block, cube};
-
-    fn above_a_plate(body: Body) -> Scene {
-        let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        Scene::new(body, [plate], 0.01, 0.1, at(0.004))
-    }
-
-    /// The lowest point of a body of 5 mm at a height, m.
-    fn at(height: f64) -> Pose {
-        Pose::translation(0.0, 0.0, 0.005 + height)
-    }
+    use crate::recipes::{ball, cube};
 
     /// Comes down by 3 mm, to 1 mm above the plate, and is looked at there and deeper without an update.
-    fn is_live(mut method: Penalty, stiffness: f64) {
+    fn is_live(body: Body, tuning: Tuning) {
+        let scene = scene(body, 0.004);
+        let mut method = Penalty::new(&scene, tuning);
         method.update(0.0, &at(0.001));
         method.publish(0.0);
         for height in [0.001, 1e-5, -1e-5, -0.001, -0.003] {
             let force = linear(&method.force(0.0, &at(height)));
-            let right = Vector3::z() * (stiffness * (-height).max(0.0));
+            let right = Vector3::z() * (scene.stiffness() * (-height).max(0.0));
             assert!((force - right).norm() < 1e-9, "{height} m: {force}");
         }
     }
 
     #[test]
     fn between_updates_the_force_is_of_the_device_and_begins_at_the_surface() {
-        let scene = above_a_plate(cube(0.005));
-        is_live(
-            Penalty::new(&scene, ShellForce::Deepest, 0.125),
-            scene.stiffness(),
-        );
+        is_live(cube(0.005), Method::Penalty.tunings()[0]);
     }
 
     #[test]
     fn a_ball_of_one_point_is_as_round_as_it_is() {
-        let scene = above_a_plate(ball(0.005));
-        is_live(
-            Penalty::round(&scene, ShellForce::Deepest),
-            scene.stiffness(),
-        );
+        let tuning = Tuning::Round(ShellForce::Deepest);
+        is_live(ball(0.005), tuning);
         // Meshes have no such point: the vertices stand for them.
-        let scene = above_a_plate(cube(0.005));
-        is_live(
-            Penalty::round(&scene, ShellForce::Deepest),
-            scene.stiffness(),
-        );
+        is_live(cube(0.005), tuning);
     }
 }

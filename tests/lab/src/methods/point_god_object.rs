@@ -19,7 +19,8 @@ use god_object::{Pose, Settings, SolverKind, Vector6, World};
 use nalgebra::{Matrix3, Translation3, Vector3};
 
 use super::contacts::{ContactFinder, limited};
-use crate::method::{HapticMethod, Scene};
+use crate::method::{HapticMethod, Method, Scene};
+use crate::tuning::Tuning;
 
 /// Faces met in one update, at most: three planes hold a point, and leaving one for another takes a second look.
 const MAX_LEGS: u32 = 8;
@@ -50,8 +51,11 @@ pub struct PointGodObject {
 }
 
 impl PointGodObject {
-    /// At the scene's start. Faces within `touch` rest distances count as touched.
-    pub fn new(scene: &Scene, touch: f64) -> Self {
+    /// At the scene's start. A tuning that is not of this method is its first one.
+    pub(crate) fn new(scene: &Scene, tuning: Tuning) -> Self {
+        let Tuning::Touch(touch) = tuning else {
+            return Self::new(scene, Method::Point.tunings()[0]);
+        };
         let settings = scene.settings;
         let held = Held {
             pose: scene.start,
@@ -183,7 +187,8 @@ impl HapticMethod for PointGodObject {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use taut_method_tests::solids::{body, mesh, obstacle};
+    use crate::recipes::cube;
+    use taut_method_tests::solids::{mesh, obstacle};
     use taut_scene::shapes::cuboid;
 
     #[test]
@@ -192,15 +197,14 @@ mod tests {
             let solid = mesh(cuboid([0.1; 3]));
             obstacle(name, solid, Pose::translation(at[0], at[1], at[2]))
         };
-        let held = body(mesh(cuboid([0.005; 3])));
         let walls = [
             wall("x", [-0.1, 0.0, 0.0]),
             wall("y", [0.1, -0.1, 0.0]),
             wall("z", [0.1, 0.1, -0.1]),
         ];
         let start = Pose::translation(0.02, 0.02, 0.02);
-        let scene = Scene::new(held, walls, 0.01, 0.1, start);
-        let mut method = PointGodObject::new(&scene, 2.0);
+        let scene = Scene::new(cube(0.005), walls, 0.01, 0.1, start);
+        let mut method = PointGodObject::new(&scene, Tuning::Touch(2.0));
         let device = Pose::translation(0.004, 0.003, 0.002);
         for _ in 0..10 {
             method.update(0.0, &device);

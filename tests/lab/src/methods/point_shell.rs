@@ -210,18 +210,16 @@ fn divide(places: &mut [Place], first: usize, end: usize, balls: &mut Vec<Ball>)
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::recipes::{block, cube};
+    use std::sync::Arc;
 
-    /// A cube of 10 mm beside a block, tilted so that one corner is the lowest.
-    fn world() -> (World, Pose) {
-        let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        let world = World {
-            body: cube(0.005),
-            obstacles: vec![plate],
-        };
+    use super::super::above_a_plate;
+    use super::*;
+    use crate::recipes::cube;
+
+    /// Tilted so that one corner is the lowest.
+    fn world() -> (Arc<World>, Pose) {
         let pose = Pose::new(Vector3::new(0.0, 0.0, 0.006), Vector3::new(0.4, 0.3, 0.0));
-        (world, pose)
+        (above_a_plate::scene(cube(0.005), 0.001).world, pose)
     }
 
     #[test]

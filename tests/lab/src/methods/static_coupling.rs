@@ -12,11 +12,12 @@
 use std::sync::Arc;
 
 use god_object::spatial::{
-    advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference,
+    advance_pose, angular, at_reference_point, from_reference_point, pose_difference,
 };
 use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Matrix6, Vector3};
 
+use super::contacts::{PERIODS_AHEAD, longest_way};
 use super::point_shell::PointShell;
 use super::saturating_spring::{balance, mass_matrix, on_hand};
 use super::settle::Spring;
@@ -26,8 +27,6 @@ use crate::tuning::Tuning;
 
 /// Newton steps in an update, at most.
 const STEPS: u32 = 12;
-/// Planes are used from one period after their device pose to two: the device goes on as it came.
-const PERIODS_AHEAD: f64 = 2.0;
 
 /// What the force needs of an update.
 #[derive(Clone, Debug)]
@@ -94,11 +93,6 @@ impl StaticCoupling {
         }
     }
 
-    /// Most that a point of the body moves, m.
-    fn length(&self, motion: &Vector6) -> f64 {
-        linear(motion).norm() + self.radius * angular(motion).norm()
-    }
-
     /// Looks for planes within a distance of the contact's begin, m.
     fn look(&mut self, margin: f64) {
         let pose = from_reference_point(&self.now.at, &self.world.body.reference_point);
@@ -136,7 +130,8 @@ impl HapticMethod for StaticCoupling {
     fn update(&mut self, _time: f64, device: &Pose) {
         let device = at_reference_point(device, &self.world.body.reference_point);
         let last = std::mem::replace(&mut self.last_device, device);
-        let moved = self.length(&pose_difference(&device, &last, &Vector3::zeros()));
+        let moved = pose_difference(&device, &last, &Vector3::zeros());
+        let moved = longest_way(&moved, self.radius);
         let least = self.settings.activation_distance + PERIODS_AHEAD * moved;
         let mut margin = least;
         for step in 0..=STEPS {
@@ -161,7 +156,7 @@ impl HapticMethod for StaticCoupling {
             let Some(motion) = motion else {
                 break;
             };
-            let length = self.length(&motion);
+            let length = longest_way(&motion, self.radius);
             let share = (margin / length).min(1.0);
             self.now.at = advance_pose(&self.now.at, &motion, share);
             if length <= self.settings.motion_tolerance {
@@ -207,23 +202,16 @@ impl HapticMethod for StaticCoupling {
 
 #[cfg(test)]
 mod tests {
+    use god_object::spatial::linear;
+
+    use super::super::above_a_plate::{at, scene};
     use super::*;
-    use crate::recipes::{ball, block, cube};
+    use crate::recipes::{ball, cube};
     use crate::tuning::ShellPoints;
-
-    fn at(height: f64) -> Pose {
-        Pose::translation(0.0, 0.0, 0.005 + height)
-    }
-
-    /// A body of 5 mm above a plate.
-    fn scene(body: god_object::Body) -> Scene {
-        let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        Scene::new(body, [plate], 0.01, 0.1, at(0.004))
-    }
 
     #[test]
     fn the_force_is_that_of_two_springs_in_series_from_the_offset_on() {
-        let scene = scene(ball(0.005));
+        let scene = scene(ball(0.005), 0.004);
         let ratio = 1000.0;
         let tuning = Tuning::Static {
             points: ShellPoints::Round,
@@ -245,7 +233,7 @@ mod tests {
 
     #[test]
     fn a_body_that_goes_on_is_as_if_it_were_updated_at_each_force() {
-        let scene = scene(cube(0.005));
+        let scene = scene(cube(0.005), 0.004);
         for tuning in Method::StaticCoupling.tunings() {
             let mut method = StaticCoupling::new(&scene, tuning);
             for height in [0.0015, 0.0010] {

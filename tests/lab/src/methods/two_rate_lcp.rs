@@ -21,17 +21,14 @@ use std::sync::Arc;
 
 use god_object::quasi_statics::{HalfSpace, Metric, Projector};
 use god_object::spatial::{
-    advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference, six,
+    advance_pose, angular, at_reference_point, from_reference_point, pose_difference, six,
 };
 use god_object::{Pose, Settings, SolverKind, Vector6, World};
 use nalgebra::{Point3, Vector3};
 
-use super::contacts::{ContactFinder, limited};
+use super::contacts::{ContactFinder, PERIODS_AHEAD, limited, longest_way};
 use crate::method::{HapticMethod, Method, Scene};
 use crate::tuning::Tuning;
-
-/// A problem is used from one period after its device pose to two: the device goes on as it came.
-const PERIODS_AHEAD: f64 = 2.0;
 
 /// Contacts of a body at a pose, and its coupling.
 #[derive(Clone, Debug)]
@@ -123,22 +120,18 @@ impl TwoRateLcp {
             }
         }));
     }
-
-    /// Most that a point of the body moves, m.
-    fn length(&self, motion: &Vector6) -> f64 {
-        linear(motion).norm() + self.radius * angular(motion).norm()
-    }
 }
 
 impl HapticMethod for TwoRateLcp {
     fn update(&mut self, _time: f64, device: &Pose) {
         let device = at_reference_point(device, &self.world.body.reference_point);
         let last = std::mem::replace(&mut self.last_device, device);
-        let moved = self.length(&pose_difference(&device, &last, &Vector3::zeros()));
+        let moved = pose_difference(&device, &last, &Vector3::zeros());
+        let moved = longest_way(&moved, self.radius);
         let free = pose_difference(&device, &self.at, &self.turn);
         self.turn = angular(&free);
         // The body goes as far as it is free in this update, and the device until the problem is no longer used.
-        let reach = self.length(&free) + PERIODS_AHEAD * moved;
+        let reach = longest_way(&free, self.radius) + PERIODS_AHEAD * moved;
         let grown = self.settings.activation_distance + reach;
         self.look(self.contact_distance + self.alarm.unwrap_or(grown));
         let motion = self.now.solve(&mut self.projector, &free);
@@ -170,29 +163,21 @@ impl HapticMethod for TwoRateLcp {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::recipes::{block, cube};
+    use god_object::spatial::linear;
 
-    fn scene() -> Scene {
-        let plate = block("plate", [-0.1, -0.1, -0.05].into(), [0.1, 0.1, 0.0].into());
-        Scene::new(
-            cube(0.005),
-            [plate],
-            0.01,
-            0.1,
-            Pose::translation(0.0, 0.0, 0.0055),
-        )
-    }
+    use super::super::above_a_plate::{at, scene};
+    use super::*;
+    use crate::recipes::cube;
 
     #[test]
     fn forces_and_gaps_are_complementary() {
-        let scene = scene();
+        let scene = scene(cube(0.005), 0.5e-3);
         let mut method = TwoRateLcp::new(&scene, Method::TwoRateLcp.tunings()[0]);
         let device = Pose::new(
             Vector3::new(1e-4, -2e-4, 0.0045),
             Vector3::new(0.02, -0.01, 0.0),
         );
-        method.update(0.0, &Pose::translation(0.0, 0.0, 0.0055));
+        method.update(0.0, &at(0.5e-3));
         method.update(0.0, &device);
         let free = pose_difference(&device, &method.now.at, &Vector3::zeros());
         assert!(!method.now.rows.is_empty());
@@ -218,8 +203,7 @@ mod tests {
 
     #[test]
     fn between_updates_the_force_is_of_the_device() {
-        let scene = scene();
-        let at = |height: f64| Pose::translation(0.0, 0.0, 0.005 + height);
+        let scene = scene(cube(0.005), 0.5e-3);
         let mut method = TwoRateLcp::new(&scene, Method::TwoRateLcp.tunings()[0]);
         let contact = method.contact_distance;
         for height in [1e-5, 0.0] {

@@ -25,8 +25,9 @@ use god_object::spatial::{
 use god_object::{Pose, Settings, SolverKind, Vector6, World};
 use nalgebra::{Point3, Vector3};
 
-use super::contacts::{ContactFinder, free_share, limited, project};
-use crate::method::{HapticMethod, Scene};
+use super::contacts::{ContactFinder, free_share, limited, longest_way, project};
+use crate::method::{HapticMethod, Method, Scene};
+use crate::tuning::Tuning;
 
 /// What the force needs of an update.
 #[derive(Clone, Debug)]
@@ -62,9 +63,16 @@ pub struct VirtualCoupling {
 }
 
 impl VirtualCoupling {
-    /// At the scene's start, updated every `period` seconds. `share`: inertia of the proxy over that of the body; `damping_ratio`: damping
-    /// over critical damping.
-    pub fn new(scene: &Scene, period: f64, share: f64, damping_ratio: f64) -> Self {
+    /// At the scene's start, updated every `period` seconds. A tuning that is not of this method is its first one.
+    pub(crate) fn new(scene: &Scene, period: f64, tuning: Tuning) -> Self {
+        let Tuning::Proxy {
+            share,
+            damping_ratio,
+            goes_on,
+        } = tuning
+        else {
+            return Self::new(scene, period, Method::VirtualCoupling.tunings()[0]);
+        };
         let settings = scene.settings;
         let stiffness = settings.k_h * settings.k_s;
         let body = &scene.world.body;
@@ -82,7 +90,7 @@ impl VirtualCoupling {
             stiffness,
             damping: 2.0 * damping_ratio * (stiffness * share).sqrt(),
             radius: body.mesh.radius_about(&body.reference_point),
-            goes_on: false,
+            goes_on,
             proxy: proxy.clone(),
             published: proxy,
             turn: Vector3::zeros(),
@@ -92,14 +100,6 @@ impl VirtualCoupling {
             finder: ContactFinder::new(&settings),
             rows: Vec::with_capacity(settings.max_constraints),
             projector: Projector::new(SolverKind::ActiveSet, settings.max_constraints),
-        }
-    }
-
-    /// The same with a proxy that goes on between updates.
-    pub fn going_on(self) -> Self {
-        Self {
-            goes_on: true,
-            ..self
         }
     }
 
@@ -154,7 +154,7 @@ impl HapticMethod for VirtualCoupling {
             / (self.share + damper + h * spring);
         let step = wished * h;
 
-        let reach = linear(&step).norm() + self.radius * angular(&step).norm();
+        let reach = longest_way(&step, self.radius);
         let centre = Point3::from(start.translation.vector);
         let found = self.finder.find(
             &self.world,
@@ -177,8 +177,7 @@ impl HapticMethod for VirtualCoupling {
             let pose = advance_pose(&start, &step, share);
             from_reference_point(&pose, &body.reference_point)
         };
-        let length = linear(&step).norm() + self.radius * angular(&step).norm();
-        let free = free_share(&self.world, length, at);
+        let free = free_share(&self.world, longest_way(&step, self.radius), at);
         self.proxy.velocity = step * (free / h);
         if free > 0.0 {
             self.proxy.pose = at(free);
@@ -237,12 +236,12 @@ mod tests {
         let last = PERIOD * f64::from(updates);
         let at = |time: f64| Pose::translation(0.0, 0.0, HALF + height + SPEED * (last - time));
         let scene = Scene::new(cube(HALF), [plate], 0.01, SPEED, at(0.0));
-        let coupling = VirtualCoupling::new(&scene, PERIOD, 0.0, 0.0);
-        let mut coupling = if goes_on {
-            coupling.going_on()
-        } else {
-            coupling
+        let tuning = Tuning::Proxy {
+            share: 0.0,
+            damping_ratio: 0.0,
+            goes_on,
         };
+        let mut coupling = VirtualCoupling::new(&scene, PERIOD, tuning);
         for update in 0..=updates {
             let time = PERIOD * f64::from(update);
             coupling.update(time, &at(time));
