@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use god_object::{Body, Obstacle, Pose, Settings, Vector6, World};
+use taut_scene::BuiltScene;
 
 use crate::methods::{
     Control, Discrete, GodObjectMethod, LinearisedPenalty, Penalty, PointGodObject, StaticCoupling,
@@ -69,6 +70,16 @@ impl Scene {
             start,
             settings,
             speed,
+        }
+    }
+
+    /// As a scene file has it, for a device whose speed nothing asks for.
+    pub(crate) fn built(scene: &BuiltScene) -> Self {
+        Self {
+            world: scene.world.clone().into(),
+            start: scene.start,
+            settings: scene.settings,
+            speed: 0.0,
         }
     }
 

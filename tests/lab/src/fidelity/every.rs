@@ -14,7 +14,8 @@ use taut_scene::fidelity::need::rates;
 use taut_scene::fidelity::{Fixed, SceneNeed, Usage, decide};
 use taut_scene::{BuiltScene, Scene as SceneFile, SceneError};
 
-use super::sweep::{BUDGET, Measured, Setting, measured};
+use super::sweep::{BUDGET, Setting, Swept, measured};
+use super::tables::markdown;
 use crate::clock::TICK;
 use crate::cpu_time::quantile;
 use crate::crew;
@@ -32,47 +33,13 @@ const LONGEST: f64 = 10.0;
 /// Scenes that are shipped.
 const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../server/scenes");
 
-/// The choice in one case.
-#[derive(Clone, Debug)]
-pub struct Judged {
-    /// Recipe and case, or the shipped scene.
-    pub name: String,
-    /// Predicted error of the choice.
-    pub predicted: f64,
-    /// The choice.
-    pub auto: Measured,
-    /// Every rate and number of rounds at the tolerance of the choice.
-    pub all: Vec<Measured>,
+/// The ratio of a choice that is within the budget.
+fn ratio(judged: &Swept) -> Option<f64> {
+    judged.ratio().filter(|_| judged.is_within())
 }
 
-impl Judged {
-    fn cheapest(&self) -> Option<&Measured> {
-        let within = self.all.iter().filter(|measured| measured.j <= BUDGET);
-        within.min_by(|a, b| a.cost.total_cmp(&b.cost))
-    }
-
-    /// Whether the choice is within the budget.
-    #[must_use]
-    pub fn is_within(&self) -> bool {
-        self.auto.j <= BUDGET
-    }
-
-    /// Whether it is, or no setting is.
-    #[must_use]
-    pub fn is_kept(&self) -> bool {
-        self.is_within() || self.cheapest().is_none()
-    }
-
-    /// Cost of the choice over the cheapest that is within the budget, where the choice is.
-    #[must_use]
-    pub fn ratio(&self) -> Option<f64> {
-        let best = self.cheapest()?;
-        self.is_within().then(|| self.auto.cost / best.cost)
-    }
-}
-
-/// Those of these names, or all.
-pub fn run(names: &[String]) -> Result<Vec<Judged>, SceneError> {
+/// Recipes and shipped scenes of these names, or all.
+pub fn run(names: &[String]) -> Result<Vec<Swept>, SceneError> {
     let mut cases = all(Extent::Quick);
     cases.retain(|recipe| !matches!(recipe.ideal, Ideal::None));
     cases.extend(shipped()?);
@@ -85,8 +52,8 @@ pub fn run(names: &[String]) -> Result<Vec<Judged>, SceneError> {
     }))
 }
 
-/// The choice of a recipe beside every rate and number of rounds.
-fn judge(recipe: &Recipe) -> Judged {
+/// The choice of a recipe beside every rate and number of rounds at its tolerance.
+fn judge(recipe: &Recipe) -> Swept {
     let scene = &recipe.scene;
     let need = SceneNeed::of_world(&scene.world, &scene.settings, &usage(recipe));
     let chosen = decide(&need, &Fixed::default(), BUDGET, None);
@@ -110,11 +77,12 @@ fn judge(recipe: &Recipe) -> Judged {
             with(rate, rounds)
         }
     });
-    Judged {
+    Swept {
         name: format!("{} {}", recipe.name, recipe.case),
-        predicted: chosen.j,
+        predicted_j: chosen.j,
         auto,
         all: others.collect(),
+        timed: Vec::new(),
     }
 }
 
@@ -186,12 +154,6 @@ fn along_its_path(name: &'static str, built: &BuiltScene) -> Option<Recipe> {
         pose: sample.pose,
     });
     let path = MinJerkPath::new(via.collect(), false).ok()?;
-    let scene = Scene {
-        world: built.world.clone().into(),
-        start: built.start,
-        settings: built.settings,
-        speed: 0.0,
-    };
     let duration = (samples.last()?.time - first).min(LONGEST);
     Some(Recipe {
         ideal: Ideal::Reference,
@@ -199,7 +161,7 @@ fn along_its_path(name: &'static str, built: &BuiltScene) -> Option<Recipe> {
         ..Recipe::new(
             ("shipped", name.to_owned()),
             "shipped",
-            scene,
+            Scene::built(built),
             duration,
             move |time| path.at(time).0,
         )
@@ -207,14 +169,14 @@ fn along_its_path(name: &'static str, built: &BuiltScene) -> Option<Recipe> {
 }
 
 /// CSV of every setting of every case.
-pub fn csv(judged: &[Judged]) -> String {
+pub fn csv(judged: &[Swept]) -> String {
     let mut text =
         "case,rate_hz,rounds,chosen,predicted_j,j,j_p95,j_p99,j_first,cost_us_per_s\n".to_owned();
     for case in judged {
         for m in &case.all {
             let chosen = m.setting == case.auto.setting;
             let predicted = if chosen {
-                format!("{:.6}", case.predicted)
+                format!("{:.6}", case.predicted_j)
             } else {
                 String::new()
             };
@@ -236,28 +198,14 @@ pub fn csv(judged: &[Judged]) -> String {
 }
 
 /// A table of Markdown, with how many are within the budget and how dear they are in the median.
-pub fn table(judged: &[Judged]) -> String {
-    let mut text = "| case | rate, Hz | rounds | J predicted | J measured | cost over the least within the budget | verdict |\n| --- | --- | --- | --- | --- | --- | --- |\n".to_owned();
-    for case in judged {
-        let verdict = match (case.is_within(), case.cheapest()) {
-            (true, _) => "within",
-            (false, Some(_)) => "**over, though some setting is within**",
-            (false, None) => "over, as every setting is",
-        };
-        let ratio = case.ratio().map_or("–".to_owned(), |r| format!("{r:.2}"));
-        let s = &case.auto.setting;
-        let _ = writeln!(
-            text,
-            "| {} | {} | {} | {:.3} | {:.3} | {ratio} | {verdict} |",
-            case.name, s.rate, s.rounds, case.predicted, case.auto.j
-        );
-    }
-    let ratios: Vec<f64> = judged.iter().filter_map(Judged::ratio).collect();
-    let count = |of: fn(&Judged) -> bool| judged.iter().filter(|case| of(case)).count();
+pub fn table(judged: &[Swept]) -> String {
+    let mut text = markdown("case", judged, ratio);
+    let ratios: Vec<f64> = judged.iter().filter_map(ratio).collect();
+    let count = |of: fn(&Swept) -> bool| judged.iter().filter(|case| of(case)).count();
     let _ = writeln!(
         text,
         "\n{} of {} within the budget, {} where some setting is; cost over the least: median {:.2}, three quarters at most {:.2}, most {:.2}",
-        count(Judged::is_within),
+        count(Swept::is_within),
         judged.len(),
         count(|case| case.cheapest().is_some()),
         quantile(&ratios, 0.5),

@@ -108,7 +108,7 @@ impl Picture<'_> {
     }
 
     fn row(&self, y: i32, s: &Swept) -> Drawn {
-        self.write(s.name, (16, y - 8), 14, BLACK)?;
+        self.write(&s.name, (16, y - 8), 14, BLACK)?;
         // Those within lie above the line, the others below it.
         for setting in &s.all {
             let (up, ink) = if setting.j <= BUDGET {

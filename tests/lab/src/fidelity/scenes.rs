@@ -120,19 +120,25 @@ impl FidelityScene {
     }
 }
 
-/// A scene file: body, its start, obstacle, and what is known of its use: how fast the hand goes, m/s, and turns, rad/s, and how hard it presses, N.
-pub(super) fn text(
-    body: &str,
-    start: [f64; 3],
-    obstacle: &str,
+/// A body at its start before an obstacle; how fast the hand goes, m/s, and turns, rad/s, and how hard it presses, N; no right answer yet.
+pub(super) fn scene(
+    name: &'static str,
+    (body, [x, y, z], obstacle): (&str, [f64; 3], &str),
     [speed, turn, force]: [f64; 3],
-) -> String {
-    let [x, y, z] = start;
-    format!(
-        "name = \"fidelity\"\n[god_object]\nshape = {{ {body} }}\nmass = 1.0\npose = {{ position = [{x:?}, {y:?}, {z:?}] }}\n\
-         [coupling]\nk_s = 0.5\nk_h = 2000.0\nadaptation = false\n[fidelity]\nmode = \"auto\"\nspeed = {speed:?}\nturn_rate = {turn:?}\nforce = {force:?}\n\
-         [[obstacle]]\nname = \"a\"\n{obstacle}\n"
-    )
+    duration: f64,
+    device: impl Fn(f64) -> Pose + Send + Sync + 'static,
+) -> FidelityScene {
+    FidelityScene {
+        name,
+        text: format!(
+            "name = \"fidelity\"\n[god_object]\nshape = {{ {body} }}\nmass = 1.0\npose = {{ position = [{x:?}, {y:?}, {z:?}] }}\n\
+             [coupling]\nk_s = 0.5\nk_h = 2000.0\nadaptation = false\n[fidelity]\nmode = \"auto\"\nspeed = {speed:?}\nturn_rate = {turn:?}\nforce = {force:?}\n\
+             [[obstacle]]\nname = \"a\"\n{obstacle}\n"
+        ),
+        device: Arc::new(device),
+        duration,
+        ideal: None,
+    }
 }
 
 /// Share of a minimum-jerk motion of `PRESS` seconds, as hands make them.
@@ -141,10 +147,19 @@ pub(super) fn share(time: f64) -> f64 {
     t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
 }
 
+/// Seconds since the hand has pressed.
+pub(super) fn on(time: f64) -> f64 {
+    (time - PRESS).max(0.0)
+}
+
+pub(super) fn at(x: f64, y: f64, z: f64) -> Pose {
+    Pose::translation(x, y, z)
+}
+
 /// Depth, m, from above the surface to [`DEPTH`] in `PRESS` seconds, and then for how long it has been so, s.
 fn pressed(time: f64) -> (f64, f64) {
     let depth = DEPTH * (2.0 * share(time) - 1.0);
-    (depth, (time - PRESS).max(0.0))
+    (depth, on(time))
 }
 
 pub(super) fn force(vector: Vector3<f64>) -> Vector6 {
@@ -152,23 +167,21 @@ pub(super) fn force(vector: Vector3<f64>) -> Vector6 {
 }
 
 const PLANE: &str = "shape = { plane = {} }";
+const BOX: &str = "box = { half_extents = [0.01, 0.01, 0.01] }";
 
 fn box_on_plane() -> FidelityScene {
-    let device = Arc::new(|time| {
-        let (depth, slid) = pressed(time);
-        Pose::translation(SLIDE * slid, 0.0, SMALL_BALL - depth)
-    });
     FidelityScene {
-        name: "box on plane",
-        text: text(
-            "box = { half_extents = [0.01, 0.01, 0.01] }",
-            [0.0, 0.0, 0.0101],
-            PLANE,
-            [SLIDE, 0.0, STIFFNESS * DEPTH],
-        ),
-        device,
-        duration: 0.6,
         ideal: Some(|time| force(Vector3::z() * (STIFFNESS * pressed(time).0.max(0.0)))),
+        ..scene(
+            "box on plane",
+            (BOX, [0.0, 0.0, 0.0101], PLANE),
+            [SLIDE, 0.0, STIFFNESS * DEPTH],
+            0.6,
+            |time| {
+                let (depth, slid) = pressed(time);
+                at(SLIDE * slid, 0.0, SMALL_BALL - depth)
+            },
+        )
     }
 }
 
@@ -177,7 +190,7 @@ fn around(time: f64, distance: f64) -> Pose {
     let (depth, slid) = pressed(time);
     let angle = SLIDE * slid / distance;
     let radius = distance - depth;
-    Pose::translation(radius * angle.sin(), 0.0, radius * angle.cos())
+    at(radius * angle.sin(), 0.0, radius * angle.cos())
 }
 
 fn outward(time: f64, distance: f64) -> Vector6 {
@@ -187,78 +200,73 @@ fn outward(time: f64, distance: f64) -> Vector6 {
 }
 
 fn sphere_on_sphere() -> FidelityScene {
+    let obstacle = "shape = { sphere = { radius = 0.02 } }";
     FidelityScene {
-        name: "sphere on sphere",
-        text: text(
-            "sphere = { radius = 0.02 }",
-            [0.0, 0.0, 0.0401],
-            "shape = { sphere = { radius = 0.02 } }",
-            [SLIDE, 0.0, STIFFNESS * DEPTH],
-        ),
-        device: Arc::new(|time| around(time, 2.0 * BALL)),
-        duration: 0.6,
         ideal: Some(|time| outward(time, 2.0 * BALL)),
+        ..scene(
+            "sphere on sphere",
+            ("sphere = { radius = 0.02 }", [0.0, 0.0, 0.0401], obstacle),
+            [SLIDE, 0.0, STIFFNESS * DEPTH],
+            0.6,
+            |time| around(time, 2.0 * BALL),
+        )
     }
 }
 
 fn curved_mesh() -> FidelityScene {
+    let obstacle = "shape = { mesh = \"ball.ply\"{simplify} }";
     FidelityScene {
-        name: "curved mesh",
-        text: text(
-            "sphere = { radius = 0.01 }",
-            [0.0, 0.0, 0.0401],
-            "shape = { mesh = \"ball.ply\"{simplify} }",
-            [SLIDE, 0.0, STIFFNESS * DEPTH],
-        ),
-        device: Arc::new(|time| around(time, MESH_BALL + SMALL_BALL)),
-        duration: 0.6,
         ideal: Some(|time| outward(time, MESH_BALL + SMALL_BALL)),
+        ..scene(
+            "curved mesh",
+            ("sphere = { radius = 0.01 }", [0.0, 0.0, 0.0401], obstacle),
+            [SLIDE, 0.0, STIFFNESS * DEPTH],
+            0.6,
+            |time| around(time, MESH_BALL + SMALL_BALL),
+        )
     }
 }
 
 fn peg_in_hole() -> FidelityScene {
-    FidelityScene {
-        name: "peg in hole",
-        text: text(
+    scene(
+        "peg in hole",
+        (
             "cylinder = { radius = 0.01, half_length = 0.03, facets = 24, axis = \"z\" }",
             [0.0, 0.0, 0.0],
             "shape = { box_with_hole = { half_extents = [0.03, 0.03, 0.03], radius = 0.0105, facets = 24, axis = \"z\" } }",
-            [0.05, 0.5, STIFFNESS * DEPTH],
         ),
+        [0.05, 0.5, STIFFNESS * DEPTH],
+        0.6,
         // Against the wall, along it, and leaned.
-        device: Arc::new(|time| {
+        |time| {
             let on = pressed(time).1;
             let lean = 0.05 * (10.0 * on).sin();
+            let aside = share(time) * (5e-4 + DEPTH);
             Pose::from_parts(
-                Vector3::new(
-                    share(time) * (5e-4 + DEPTH),
-                    1e-3 * (20.0 * on).sin(),
-                    0.02 * on,
-                )
-                .into(),
+                Vector3::new(aside, 1e-3 * (20.0 * on).sin(), 0.02 * on).into(),
                 UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean),
             )
-        }),
-        duration: 0.6,
-        ideal: None,
-    }
+        },
+    )
 }
 
 fn thin_plate() -> FidelityScene {
     FidelityScene {
-        name: "thin plate",
-        text: text(
-            "sphere = { radius = 0.01 }",
-            [0.0, 0.0, 0.1],
-            "shape = { box = { half_extents = [0.1, 0.1, 0.0005] } }\npose = { position = [0.0, 0.0, -0.0005] }",
-            [FAST, 0.0, STIFFNESS * (SMALL_BALL - ARRIVED)],
-        ),
-        device: Arc::new(|time| Pose::translation(0.0, 0.0, arrival(time))),
-        duration: 0.4,
         ideal: Some(|time| {
             let depth = (SMALL_BALL - arrival(time)).max(0.0);
             force(Vector3::z() * (STIFFNESS * depth))
         }),
+        ..scene(
+            "thin plate",
+            (
+                "sphere = { radius = 0.01 }",
+                [0.0, 0.0, 0.1],
+                "shape = { box = { half_extents = [0.1, 0.1, 0.0005] } }\npose = { position = [0.0, 0.0, -0.0005] }",
+            ),
+            [FAST, 0.0, STIFFNESS * (SMALL_BALL - ARRIVED)],
+            0.4,
+            |time| at(0.0, 0.0, arrival(time)),
+        )
     }
 }
 
@@ -268,41 +276,36 @@ fn arrival(time: f64) -> f64 {
 }
 
 fn moving_plate(rise: f64) -> FidelityScene {
+    let plate = "shape = { plane = {} }\nmotion = { trace = \"plate.csv\" }";
     FidelityScene {
-        name: "moving plate",
-        text: text(
-            "box = { half_extents = [0.01, 0.01, 0.01] }",
-            [0.0, 0.0, 0.0101],
-            "shape = { plane = {} }\nmotion = { trace = \"plate.csv\" }",
-            [0.01, 0.0, STIFFNESS * (DEPTH - ABOVE)],
-        ),
-        device: Arc::new(|_| Pose::translation(0.0, 0.0, SMALL_BALL + ABOVE)),
-        duration: rise + 0.1,
         ideal: Some(|time| {
             let height = (PLATE * time - DEPTH).min(DEPTH);
             force(Vector3::z() * (STIFFNESS * (height - ABOVE).max(0.0)))
         }),
+        ..scene(
+            "moving plate",
+            (BOX, [0.0, 0.0, 0.0101], plate),
+            [0.01, 0.0, STIFFNESS * (DEPTH - ABOVE)],
+            rise + 0.1,
+            |_| at(0.0, 0.0, SMALL_BALL + ABOVE),
+        )
     }
 }
 
 fn rod_on_plane() -> FidelityScene {
-    FidelityScene {
-        name: "turning rod",
-        text: text(
-            "box = { half_extents = [0.04, 0.005, 0.005] }",
-            [0.0, 0.0, 0.0051],
-            PLANE,
-            [0.05, TURN, ROD_FORCE],
-        ),
+    let rod = "box = { half_extents = [0.04, 0.005, 0.005] }";
+    scene(
+        "turning rod",
+        (rod, [0.0, 0.0, 0.0051], PLANE),
+        [0.05, TURN, ROD_FORCE],
+        0.8,
         // Its end goes down and up again while its middle stays.
-        device: Arc::new(|time| {
+        |time| {
             let swing = 0.5 * (TURN / 0.5 * time).sin();
             Pose::from_parts(
                 Vector3::new(0.0, 0.0, 0.005 + ROD * 0.1).into(),
                 UnitQuaternion::from_axis_angle(&Vector3::y_axis(), swing),
             )
-        }),
-        duration: 0.8,
-        ideal: None,
-    }
+        },
+    )
 }

@@ -3,46 +3,19 @@
 use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 
 use god_object::Pose;
 use god_object::nalgebra::{UnitQuaternion, Vector3};
-use taut_scene::shapes;
 
-use super::scenes::{ABOVE, FidelityScene, STIFFNESS, force, share, text, with_hands};
+use super::held_out::egg;
+use super::scenes::{ABOVE, FidelityScene, STIFFNESS, at, force, on, scene, share, with_hands};
 
-/// Time to come down and press, s: the share of a minimum-jerk motion of the other scenes.
-const PRESS: f64 = 0.2;
 /// Where the plate of `lift.csv` begins and ends, m, and how fast it rises, m/s.
 const LIFT: [f64; 2] = [-2e-3, 4e-3];
 const LIFTING: f64 = 0.02;
 
-/// Seconds since the hand has pressed.
-fn on(time: f64) -> f64 {
-    (time - PRESS).max(0.0)
-}
-
-fn at(x: f64, y: f64, z: f64) -> Pose {
-    Pose::translation(x, y, z)
-}
-
 fn turned(x: f64, y: f64, z: f64, axis: Vector3<f64>) -> Pose {
     Pose::from_parts(Vector3::new(x, y, z).into(), UnitQuaternion::new(axis))
-}
-
-fn scene(
-    name: &'static str,
-    text: String,
-    duration: f64,
-    device: impl Fn(f64) -> Pose + Send + Sync + 'static,
-) -> FidelityScene {
-    FidelityScene {
-        name,
-        text,
-        device: Arc::new(device),
-        duration,
-        ideal: None,
-    }
 }
 
 /// On a circle of this radius about the y axis, `depth` inside it once pressed, with this speed along it,
@@ -57,11 +30,8 @@ fn around(radius: f64, depth: f64, speed: f64) -> impl Fn(f64) -> Pose + Send + 
 
 /// All of them; their files are written into `directory`.
 pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
-    let mut egg = shapes::sphere(0.03, 5);
-    for vertex in &mut egg.vertices {
-        vertex.z *= 0.6;
-    }
-    fs::write(directory.join("egg.ply"), taut_scene::write_ply(&egg))?;
+    let egg = taut_scene::write_ply(&egg(0.03, 5, 0.6));
+    fs::write(directory.join("egg.ply"), egg)?;
     let lift =
         "t,x,y,z,qw,qx,qy,qz\n0,0,0,-0.002,1,0,0,0\n0.3,0,0,0.004,1,0,0,0\n1,0,0,0.004,1,0,0,0\n";
     fs::write(directory.join("lift.csv"), lift)?;
@@ -79,34 +49,30 @@ fn round(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
     vec![
         scene(
             "small on small",
-            text(
-                &ball(0.005),
-                [0.0, 0.0, 0.0171],
-                &shape(ball(0.012)),
-                [0.15, 0.0, 1.5],
-            ),
+            (&ball(0.005), [0.0, 0.0, 0.0171], &shape(ball(0.012))),
+            [0.15, 0.0, 1.5],
             0.35,
             around(0.017, 1.5e-3, 0.15),
         ),
         scene(
             "ball round a rod",
-            text(
+            (
                 &ball(0.008),
                 [0.0, 0.0, 0.0331],
                 "shape = { capsule = { radius = 0.025, half_length = 0.05, axis = \"y\" } }",
-                [0.25, 0.0, 2.5],
             ),
+            [0.25, 0.0, 2.5],
             0.5,
             around(0.033, 2.5e-3, 0.25),
         ),
         scene(
             "ball round a prism",
-            text(
+            (
                 &ball(0.01),
                 [0.0, 0.0, 0.0401],
                 "shape = { cylinder = { radius = 0.03, half_length = 0.05, facets = 48, axis = \"y\" } }",
-                [0.12, 0.0, 2.0],
             ),
+            [0.12, 0.0, 2.0],
             0.6,
             around(0.04, 2e-3, 0.12),
         ),
@@ -121,12 +87,12 @@ fn curved(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
     vec![
         scene(
             "ball over an egg",
-            text(
+            (
                 &ball(0.006),
                 [0.0, 0.0, 0.0241],
                 "shape = { mesh = \"egg.ply\"{simplify} }",
-                [0.08, 0.0, 2.0],
             ),
+            [0.08, 0.0, 2.0],
             0.6,
             |time| {
                 let height = 0.0241 - 2.1e-3 * share(time);
@@ -139,12 +105,8 @@ fn curved(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
         ),
         scene(
             "ball in a valley",
-            text(
-                &ball(0.012),
-                [0.0, 0.0, bottom + 1e-4],
-                valley,
-                [0.06, 0.0, 3.0],
-            ),
+            (&ball(0.012), [0.0, 0.0, bottom + 1e-4], valley),
+            [0.06, 0.0, 3.0],
             0.6,
             move |time| {
                 let side = 6e-3 * (10.0 * on(time)).sin();
@@ -164,13 +126,15 @@ fn edged(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
     vec![
         scene(
             "ball over an edge",
-            text(&ball(0.008), [-0.02, 0.0, 0.0081], block, [0.15, 0.0, 2.0]),
+            (&ball(0.008), [-0.02, 0.0, 0.0081], block),
+            [0.15, 0.0, 2.0],
             0.5,
             |time| at(-0.02 + 0.15 * on(time), 0.0, 0.0081 - 2.1e-3 * share(time)),
         ),
         scene(
             "ball along a groove",
-            text(&ball(0.01), [0.0, -0.03, 0.0155], groove, [0.2, 0.0, 3.0]),
+            (&ball(0.01), [0.0, -0.03, 0.0155], groove),
+            [0.2, 0.0, 3.0],
             0.5,
             |time| {
                 at(
@@ -182,18 +146,19 @@ fn edged(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
         ),
         scene(
             "tap on a block",
-            text(&ball(0.008), [-0.02, 0.0, 0.03], block, [0.6, 0.0, 3.0]),
+            (&ball(0.008), [-0.02, 0.0, 0.03], block),
+            [0.6, 0.0, 3.0],
             0.5,
             |time| at(-0.02, 0.0, 0.0175 + 0.0125 * (2.0 * PI * 6.0 * time).cos()),
         ),
         scene(
             "box with friction",
-            text(
+            (
                 "box = { half_extents = [0.015, 0.01, 0.01] }",
                 [0.0, 0.0, 0.0101],
                 "shape = { plane = {} }\nsurface = { friction = 0.4 }",
-                [0.08, 0.0, 2.0],
             ),
+            [0.08, 0.0, 2.0],
             0.6,
             |time| at(0.08 * on(time), 0.0, 0.0101 - 2.1e-3 * share(time)),
         ),
@@ -204,12 +169,12 @@ fn edged(ball: &impl Fn(f64) -> String) -> Vec<FidelityScene> {
             }),
             ..scene(
                 "plate lifts a ball",
-                text(
+                (
                     &ball(0.015),
                     [0.0, 0.0, 0.0151],
                     "shape = { plane = {} }\nmotion = { trace = \"lift.csv\" }",
-                    [0.02, 0.0, 4.0],
                 ),
+                [0.02, 0.0, 4.0],
                 0.5,
                 |_| at(0.0, 0.0, 0.0151),
             )
@@ -223,12 +188,12 @@ fn turning() -> Vec<FidelityScene> {
     vec![
         scene(
             "peg turned in its hole",
-            text(
+            (
                 "cylinder = { radius = 0.01, half_length = 0.025, facets = 36, axis = \"z\" }",
                 [0.0, 0.0, 0.0],
                 hole,
-                [0.03, 1.0, 1.5],
             ),
+            [0.03, 1.0, 1.5],
             0.6,
             |time| {
                 let side = 1.7e-3 * share(time);
@@ -237,12 +202,12 @@ fn turning() -> Vec<FidelityScene> {
         ),
         scene(
             "plank rocked on an edge",
-            text(
+            (
                 "box = { half_extents = [0.05, 0.01, 0.004] }",
                 [0.0, 0.0, 0.0041],
                 "shape = { box = { half_extents = [0.004, 0.03, 0.01] } }\npose = { position = [0.0, 0.0, -0.01] }",
-                [0.05, 1.5, 2.0],
             ),
+            [0.05, 1.5, 2.0],
             0.7,
             |time| {
                 let swing = 0.15 * (10.0 * on(time)).sin();

@@ -64,16 +64,16 @@ pub struct Timed {
     pub auto: Measured,
 }
 
-/// A scene's sweep.
+/// The choice of a scene beside other settings.
 #[derive(Clone, Debug)]
 pub struct Swept {
-    /// Which scene.
-    pub name: &'static str,
-    /// What the scene chose, with its reasons.
-    pub plan: FidelityPlan,
+    /// Of the scene.
+    pub name: String,
+    /// Error of the choice, as it is predicted.
+    pub predicted_j: f64,
     /// The choice, measured.
     pub auto: Measured,
-    /// Every setting.
+    /// The settings that were run.
     pub all: Vec<Measured>,
     /// Choices by the time that an update may take.
     pub timed: Vec<Timed>,
@@ -114,40 +114,48 @@ impl Swept {
     pub fn is_within(&self) -> bool {
         self.auto.j <= BUDGET
     }
+
+    /// Whether it is, or no setting is.
+    #[must_use]
+    pub fn is_kept(&self) -> bool {
+        self.is_within() || self.cheapest().is_none()
+    }
+}
+
+impl FidelityScene {
+    /// The scene file, with this where a mesh may be simplified.
+    pub(super) fn file(&self, simplify: &str, directory: &Path) -> Result<SceneFile, SceneError> {
+        let text = self.text.replace("{simplify}", simplify);
+        SceneFile::parse("fidelity.toml", &text, directory)
+    }
+}
+
+/// With the settings of the file.
+pub(super) fn without_choice(file: &SceneFile) -> Result<BuiltScene, SceneError> {
+    file.with_override("fidelity.mode=\"off\"")?.build()
 }
 
 /// What the scene chooses, from its file alone.
 pub fn choice(scene: &FidelityScene, directory: &Path) -> Result<(Setting, f64), SceneError> {
-    let plain = scene.text.replace("{simplify}", "");
-    let chosen = SceneFile::parse("fidelity.toml", &plain, directory)?.build()?;
-    let plan = chosen.fidelity.clone();
-    let plan = plan.unwrap_or_else(|| panic!("the scene chooses"));
-    Ok((setting_of(&chosen, &plan), plan.predicted_j))
+    let (setting, plan) = chosen(&scene.file("", directory)?.build()?);
+    Ok((setting, plan.predicted_j))
 }
 
 /// Builds, runs and measures. `quick` takes every other rate and the ends of the other lists.
 pub fn sweep(scene: &FidelityScene, directory: &Path, quick: bool) -> Result<Swept, SceneError> {
-    let plain = scene.text.replace("{simplify}", "");
-    let parsed = SceneFile::parse("fidelity.toml", &plain, directory)?;
-    let chosen = parsed.build()?;
-    let size = chosen.size;
-    let plan = chosen
-        .fidelity
-        .clone()
-        .unwrap_or_else(|| panic!("the scene chooses"));
-    let off = parsed.with_override("fidelity.mode=\"off\"")?.build()?;
-    let right = answer(scene, &off);
-    let auto = measure(scene, &chosen, setting_of(&chosen, &plan), &right);
+    let file = scene.file("", directory)?;
+    let built = file.build()?;
+    let size = built.size;
+    let (setting, plan) = chosen(&built);
+    let right = answer(scene, &without_choice(&file)?);
+    let auto = measure(scene, &built, setting, &right);
     let choose = |time_us: &f64| -> Result<Timed, SceneError> {
         let within = format!("fidelity.time_us={time_us:?}");
-        let chosen = parsed.with_override(&within)?.build()?;
-        let plan = chosen
-            .fidelity
-            .clone()
-            .unwrap_or_else(|| panic!("the scene chooses"));
+        let built = file.with_override(&within)?.build()?;
+        let (setting, plan) = chosen(&built);
         Ok(Timed {
             time_us: *time_us,
-            auto: measure(scene, &chosen, setting_of(&chosen, &plan), &right),
+            auto: measure(scene, &built, setting, &right),
             plan,
         })
     };
@@ -161,10 +169,7 @@ pub fn sweep(scene: &FidelityScene, directory: &Path, quick: bool) -> Result<Swe
         } else {
             String::new()
         };
-        let text = scene.text.replace("{simplify}", &simplify);
-        let base = SceneFile::parse("fidelity.toml", &text, directory)?
-            .with_override("fidelity.mode=\"off\"")?
-            .build()?;
+        let base = without_choice(&scene.file(&simplify, directory)?)?;
         let step = if quick { 2 } else { 1 };
         for rate in RATES.iter().step_by(step) {
             for tolerance in TOLERANCES.iter().step_by(step) {
@@ -182,31 +187,29 @@ pub fn sweep(scene: &FidelityScene, directory: &Path, quick: bool) -> Result<Swe
     }
     all.push(auto);
     Ok(Swept {
-        name: scene.name,
-        plan,
+        name: scene.name.to_owned(),
+        predicted_j: plan.predicted_j,
         auto,
         all,
         timed,
     })
 }
 
-fn setting_of(chosen: &BuiltScene, plan: &FidelityPlan) -> Setting {
-    Setting {
+/// What a scene chose by itself, with its reasons.
+fn chosen(built: &BuiltScene) -> (Setting, FidelityPlan) {
+    let plan = built.fidelity.clone();
+    let plan = plan.unwrap_or_else(|| panic!("the scene chooses"));
+    let setting = Setting {
         rate: plan.update_rate_hz,
-        gap_tolerance: chosen.settings.gap_tolerance,
-        rounds: chosen.settings.implicit_rounds,
-        mesh_error: chosen.simplified.first().map_or(0.0, |s| s.max_error),
-    }
+        gap_tolerance: built.settings.gap_tolerance,
+        rounds: built.settings.implicit_rounds,
+        mesh_error: built.simplified.first().map_or(0.0, |s| s.max_error),
+    };
+    (setting, plan)
 }
 
 /// The scene as a recipe, with this right answer.
 pub(super) fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
-    let lab_scene = Scene {
-        world: built.world.clone().into(),
-        start: built.start,
-        settings: built.settings,
-        speed: 0.0,
-    };
     let moving = built.motions.first().cloned();
     let device = scene.device.clone();
     Recipe {
@@ -217,7 +220,7 @@ pub(super) fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) ->
         ..Recipe::new(
             ("fidelity", scene.name.to_owned()),
             "fidelity",
-            lab_scene,
+            Scene::built(built),
             scene.duration,
             move |time| device(time),
         )
@@ -259,14 +262,12 @@ pub(super) fn measured(recipe: &Recipe, setting: Setting) -> Measured {
     scene.settings.gap_tolerance = setting.gap_tolerance;
     scene.settings.implicit_rounds = setting.rounds;
     let right = &recipe.answer().wrenches;
-    let body = &scene.world.body;
-    let arm = body.mesh.radius_about(&body.reference_point);
     let (mut percentiles, mut first, mut work) = ([0.0_f64; 2], 0.0_f64, 0);
     for phase in PHASES {
         let mut method = Counted::new(&scene, &(recipe.device)(0.0));
         let charge = &mut Charge::WholePeriod;
         let ran = run(&mut method, recipe, setting.rate as u32, phase, charge);
-        let felt = Felt::new(&ran.ticks, right, arm);
+        let felt = Felt::new(&ran.ticks, right, scene.arm());
         for (most, share) in percentiles.iter_mut().zip([0.95, 0.99]) {
             *most = or_more(*most, quantile(&felt.each, share));
         }

@@ -37,11 +37,36 @@ pub fn table(swept: &[Swept]) -> String {
             auto.setting.gap_tolerance * 1e6,
             auto.setting.rounds,
             auto.setting.mesh_error * 1e6,
-            s.plan.predicted_j,
+            s.predicted_j,
             auto.j,
             auto.cost,
             number(best.map(|b| b.cost), 0),
             number(s.ratio(), 2),
+        );
+    }
+    text
+}
+
+/// The choice of each scene as Markdown, with its cost over the least as `ratio` says.
+pub(super) fn markdown(
+    first: &str,
+    swept: &[Swept],
+    ratio: impl Fn(&Swept) -> Option<f64>,
+) -> String {
+    let mut text = format!(
+        "| {first} | rate, Hz | rounds | J predicted | J measured | cost over the least within the budget | verdict |\n| --- | --- | --- | --- | --- | --- | --- |\n"
+    );
+    for s in swept {
+        let verdict = match (s.is_within(), s.cheapest()) {
+            (true, _) => "within",
+            (false, Some(_)) => "**over, though some setting is within**",
+            (false, None) => "over, as every setting is",
+        };
+        let ratio = ratio(s).map_or("–".to_owned(), |r| format!("{r:.2}"));
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {:.3} | {:.3} | {ratio} | {verdict} |",
+            s.name, s.auto.setting.rate, s.auto.setting.rounds, s.predicted_j, s.auto.j
         );
     }
     text
@@ -114,7 +139,7 @@ pub fn choices(swept: &[Swept]) -> String {
             "{},auto,{},{:.6}",
             s.name,
             fields(&s.auto),
-            s.plan.predicted_j
+            s.predicted_j
         );
         if let Some(best) = s.cheapest() {
             let _ = writeln!(text, "{},sweep,{},", s.name, fields(best));

@@ -7,6 +7,7 @@ use taut_scene::SceneError;
 
 use super::super::scenes::FidelityScene;
 use super::super::sweep::{Swept, choice};
+use super::super::tables::markdown;
 
 /// The predictions, as they were committed.
 pub const PREDICTIONS: &str = include_str!("../../../data/held-out.csv");
@@ -31,21 +32,6 @@ pub fn predictions(scenes: &[FidelityScene], directory: &Path) -> Result<String,
 /// The verdict on what was chosen: a table of Markdown, and how many choices are within the budget or have no
 /// setting that is.
 pub fn verdict(swept: &[Swept]) -> (String, usize) {
-    let mut text = "| scene | rate, Hz | rounds | J predicted | J measured | cost over the least within the budget | verdict |\n| --- | --- | --- | --- | --- | --- | --- |\n".to_owned();
-    let mut kept = 0;
-    for s in swept {
-        let verdict = match (s.is_within(), s.cheapest()) {
-            (true, _) => "within",
-            (false, Some(_)) => "**over, though some setting is within**",
-            (false, None) => "over, as every setting is",
-        };
-        kept += usize::from(s.is_within() || s.cheapest().is_none());
-        let ratio = s.ratio().map_or("–".to_owned(), |r| format!("{r:.2}"));
-        let _ = writeln!(
-            text,
-            "| {} | {} | {} | {:.3} | {:.3} | {ratio} | {verdict} |",
-            s.name, s.auto.setting.rate, s.auto.setting.rounds, s.plan.predicted_j, s.auto.j
-        );
-    }
-    (text, kept)
+    let kept = swept.iter().filter(|s| s.is_kept()).count();
+    (markdown("scene", swept, Swept::ratio), kept)
 }

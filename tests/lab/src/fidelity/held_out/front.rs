@@ -6,10 +6,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use taut_scene::{Scene as SceneFile, SceneError};
+use taut_scene::SceneError;
 
 use super::super::scenes::FidelityScene;
-use super::super::sweep::{ideal, recipe};
+use super::super::sweep::{ideal, recipe, without_choice};
 use crate::clock::{RATES, TICK};
 use crate::crew;
 use crate::measure::Measure;
@@ -61,10 +61,7 @@ fn out_of_scope(scene: &FidelityScene, method: Method) -> bool {
 
 /// The scene as a recipe for all methods.
 fn for_methods(scene: &FidelityScene, directory: &Path) -> Result<Recipe, SceneError> {
-    let text = scene.text.replace("{simplify}", "");
-    let built = SceneFile::parse("fidelity.toml", &text, directory)?
-        .with_override("fidelity.mode=\"off\"")?
-        .build()?;
+    let built = without_choice(&scene.file("", directory)?)?;
     let mut made = recipe(scene, &built, ideal(scene));
     made.phases = PHASES;
     Ok(made)

@@ -11,3 +11,5 @@ pub mod front;
 mod moving;
 pub mod scenes;
 mod solids;
+
+pub(super) use solids::egg;

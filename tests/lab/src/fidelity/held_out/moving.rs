@@ -2,8 +2,8 @@
 
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 
-use super::super::scenes::{FidelityScene, STIFFNESS, force};
-use super::scenes::{about_y, at, down, obstacle, on, scene, turned};
+use super::super::scenes::{FidelityScene, STIFFNESS, at, force, on};
+use super::scenes::{about_y, down, obstacle, scene, turned};
 
 /// Of the lid: how far it goes to either side, m, and when it is up, when it leaves, and when it is down, s.
 /// Height of the ball above it at rest, m.

@@ -9,12 +9,10 @@ use god_object::Pose;
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use taut_scene::write_ply;
 
-use super::super::scenes::{FidelityScene, share, with_hands};
+use super::super::scenes::{FidelityScene, at, on, share, with_hands};
 use super::moving::{lid_trace, surfaces, turning};
 use super::solids::{egg, prism, relief};
 
-/// Time to come down and press, s.
-const PRESS: f64 = 0.2;
 /// Of the roof: its slopes, rad, and its length to either side, m.
 const SLOPE: f64 = 0.35;
 const ROOF: f64 = 0.06;
@@ -22,18 +20,9 @@ const ROOF: f64 = 0.06;
 const BUMP: f64 = 1e-3;
 const WAVES: [f64; 2] = [0.012, 0.015];
 
-/// Seconds since the hand has pressed.
-pub(super) fn on(time: f64) -> f64 {
-    (time - PRESS).max(0.0)
-}
-
 /// From a tenth of a millimetre above a surface to `depth` inside, m.
 pub(super) fn down(time: f64, depth: f64) -> f64 {
     1e-4 - (depth + 1e-4) * share(time)
-}
-
-pub(super) fn at(x: f64, y: f64, z: f64) -> Pose {
-    Pose::translation(x, y, z)
 }
 
 pub(super) fn turned(place: Vector3<f64>, rotation: UnitQuaternion<f64>) -> Pose {
@@ -228,19 +217,5 @@ mod tests {
         let slope = |x: f64| (roof(x + step) - roof(x)) / step;
         assert!((slope(bend - 2.0 * step) - slope(bend + step)).abs() < 1e-3);
         assert!((roof(bend - 1e-12) - roof(bend + 1e-12)).abs() < 1e-9);
-    }
-
-    #[test]
-    fn there_are_twelve_scenes_whose_files_are_right() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let scenes = all(folder.path()).expect("files can be written");
-        assert_eq!(scenes.len(), 12);
-        for scene in &scenes {
-            let text = scene.text.replace("{simplify}", "");
-            let parsed = taut_scene::Scene::parse("a.toml", &text, folder.path());
-            let built = parsed.and_then(|parsed| parsed.build());
-            let built = built.unwrap_or_else(|error| panic!("{}: {error}", scene.name));
-            assert!(built.fidelity.is_some());
-        }
     }
 }

@@ -24,7 +24,7 @@ pub(super) fn prism(outline: &[[f64; 2]], half: f64) -> RawMesh {
 }
 
 /// A ball of triangles whose z is shorter by a factor.
-pub(super) fn egg(radius: f64, subdivisions: u32, flat: f64) -> RawMesh {
+pub(in crate::fidelity) fn egg(radius: f64, subdivisions: u32, flat: f64) -> RawMesh {
     let mut raw = shapes::sphere(radius, subdivisions);
     for vertex in &mut raw.vertices {
         vertex.z *= flat;
