@@ -58,6 +58,41 @@ impl Row {
     }
 }
 
+/// Rows whose cases begin alike: `NAME: what`.
+#[derive(Debug)]
+pub(crate) struct Rows {
+    name: String,
+    pub(crate) all: Vec<Row>,
+}
+
+impl Rows {
+    /// None yet.
+    pub(crate) fn of(name: impl fmt::Display) -> Self {
+        Self {
+            name: name.to_string(),
+            all: Vec::new(),
+        }
+    }
+
+    /// A number that must not be above a limit.
+    pub(crate) fn at_most(&mut self, what: &str, measured: f64, limit: f64, unit: &str) {
+        let case = format!("{}: {what}", self.name);
+        self.all.push(Row::at_most(case, measured, limit, unit));
+    }
+
+    /// Something that must be so.
+    pub(crate) fn holds(
+        &mut self,
+        what: &str,
+        measured: impl fmt::Display,
+        expected: impl fmt::Display,
+        pass: bool,
+    ) {
+        let case = format!("{}: {what}", self.name);
+        self.all.push(Row::holds(case, measured, expected, pass));
+    }
+}
+
 /// Four digits.
 fn brief(value: f64) -> String {
     let size = value.abs();

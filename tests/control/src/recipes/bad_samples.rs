@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use taut_bridge::{EventKind, Rearm, SafetySettings};
 
-use crate::Row;
 use crate::faulty_device::{FAULT_AT, Failure, Stroke};
+use crate::row::{Row, Rows};
 
 /// Largest change of the force in a tick, N.
 const LARGEST_STEP: f64 = 0.5;
@@ -65,67 +65,43 @@ fn armed(failure: Failure, settings: SafetySettings) -> Stroke {
 /// Every case, and what a person does about it.
 #[must_use]
 pub fn run() -> Vec<Row> {
-    let mut rows = Vec::new();
+    let mut all = Vec::new();
     for (name, failure, kind) in CASES {
+        let mut rows = Rows::of(name);
         let mut stroke = armed(failure, settings(None));
         let felt = stroke.forces.last().copied().unwrap_or(0.0);
-        rows.push(Row::holds(
-            format!("{name}: force before"),
-            format!("{felt:.2} N"),
-            "> 2 N",
-            felt > 2.0,
-        ));
+        rows.holds("force before", format!("{felt:.2} N"), "> 2 N", felt > 2.0);
         stroke.run_until(Duration::from_millis(3000));
         // The last good input is one tick before the first bad one.
         let last_good = FAULT_AT.as_millis() as usize - 1;
         let gone = stroke.forces.iter().rposition(|force| *force > 0.0);
         let gone_after = gone.map_or(0.0, |last| (last + 1 - last_good) as f64);
-        rows.push(Row::at_most(
-            format!("{name}: no force after"),
-            gone_after,
-            GONE_BY,
-            "ms",
-        ));
-        rows.push(Row::at_most(
-            format!("{name}: largest step"),
-            stroke.largest_step,
-            LARGEST_STEP + EXACT,
-            "N/ms",
-        ));
+        rows.at_most("no force after", gone_after, GONE_BY, "ms");
+        let step = stroke.largest_step;
+        rows.at_most("largest step", step, LARGEST_STEP + EXACT, "N/ms");
         // Held first: 21 ms after the last good input it is still nearly all there.
         let held = stroke.forces[last_good + 20] / stroke.forces[last_good];
-        rows.push(Row::holds(
-            format!("{name}: held for 20 ms"),
-            format!("{:.0} % of it", held * 100.0),
-            "> 95 %",
-            held > 0.95,
-        ));
+        let share = format!("{:.0} % of it", held * 100.0);
+        rows.holds("held for 20 ms", share, "> 95 %", held > 0.95);
         let events = stroke.has_event(kind) && stroke.has_event(EventKind::RearmNeeded);
         let kinds: Vec<_> = stroke.events.iter().map(|(kind, _)| *kind).collect();
-        rows.push(Row::holds(
-            format!("{name}: told"),
-            format!("{kinds:?}"),
-            format!("{kind:?}, RearmNeeded"),
-            events,
-        ));
+        let expected = format!("{kind:?}, RearmNeeded");
+        rows.holds("told", format!("{kinds:?}"), expected, events);
         stroke.port().ask_to_arm();
         stroke.run_until(Duration::from_millis(3500));
         let again = stroke.forces.last().copied().unwrap_or(0.0);
         // Time stamps that stay behind are no good samples: nobody can arm that.
-        let comes_back = failure != Failure::TimeBack;
-        rows.push(Row::holds(
-            format!("{name}: armed again"),
-            format!("{again:.2} N"),
-            if comes_back { "> 2 N" } else { "refused" },
-            if comes_back {
-                again > 2.0
-            } else {
-                again == 0.0 && stroke.has_event(EventKind::ArmRefused)
-            },
-        ));
+        let (expected, right) = if failure == Failure::TimeBack {
+            let refused = stroke.has_event(EventKind::ArmRefused);
+            ("refused", again == 0.0 && refused)
+        } else {
+            ("> 2 N", again > 2.0)
+        };
+        rows.holds("armed again", format!("{again:.2} N"), expected, right);
+        all.extend(rows.all);
     }
-    rows.push(without_a_dead_mans_button());
-    rows
+    all.push(without_a_dead_mans_button());
+    all
 }
 
 /// A person asks for force but does not hold the button.

@@ -1,9 +1,9 @@
 //! Coupling beside the device against shipped forces at 20 ms one way and 5 % loss: a network on which shipping goes unstable.
 
-use crate::Row;
 use crate::edge::{Mode, run as run_task};
 use crate::edge_network::Impairment;
 use crate::edge_scenes::Task;
+use crate::row::{Row, Rows};
 
 /// One way, ms.
 const DELAY: f64 = 20.0;
@@ -19,41 +19,29 @@ const MORE_ENERGY: f64 = 10.0;
 pub fn run() -> Vec<Row> {
     let network = Impairment::new(DELAY, LOSS);
     let stability = |stable| if stable { "stable" } else { "unstable" };
-    let mut rows = Vec::new();
+    let mut all = Vec::new();
     for task in Task::all() {
-        let name = task.name;
+        let mut rows = Rows::of(task.name);
         let edge = run_task(&task, Mode::Edge, network, 1);
         let shipped = run_task(&task, Mode::Shipped, network, 1);
-        rows.push(Row::holds(
-            format!("{name}: edge"),
-            stability(edge.stable),
-            "stable",
-            edge.stable,
-        ));
-        rows.push(Row::at_most(
-            format!("{name}: edge, largest force error"),
-            edge.error.max,
-            NOTICED,
-            "JND",
-        ));
-        rows.push(Row::holds(
-            format!("{name}: shipped"),
-            stability(shipped.stable),
-            "unstable",
-            !shipped.stable,
-        ));
-        rows.push(Row::holds(
-            format!("{name}: shipped, median force error"),
-            format!("{:.2} JND", shipped.error.p50),
+        rows.holds("edge", stability(edge.stable), "stable", edge.stable);
+        rows.at_most("edge, largest force error", edge.error.max, NOTICED, "JND");
+        let unstable = !shipped.stable;
+        rows.holds("shipped", stability(shipped.stable), "unstable", unstable);
+        let median = shipped.error.p50;
+        rows.holds(
+            "shipped, median force error",
+            format!("{median:.2} JND"),
             "> 1 JND",
-            shipped.error.p50 > NOTICED,
-        ));
-        rows.push(Row::holds(
-            format!("{name}: energy given, shipped against edge"),
+            median > NOTICED,
+        );
+        rows.holds(
+            "energy given, shipped against edge",
             format!("{:.2e} J against {:.2e} J", shipped.injected, edge.injected),
             "> 10 times",
             shipped.injected > MORE_ENERGY * edge.injected,
-        ));
+        );
+        all.extend(rows.all);
     }
-    rows
+    all
 }

@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 use god_object::{Coupling, Pose, Settings};
 use nalgebra::Vector3;
 
-use crate::Row;
 use crate::closed_loop::PERIOD;
+use crate::row::{Row, Rows};
 use crate::walls::{contacts, cube, linear, stops_about_z};
 
 /// How far the device turns, rad.
@@ -57,8 +57,9 @@ fn torques(axis_turn: f64) -> (Vec<(f64, f64)>, f64, f64) {
 /// Both ways round.
 #[must_use]
 pub fn run() -> Vec<Row> {
-    let mut rows = Vec::new();
+    let mut all = Vec::new();
     for (name, sense) in [("200 deg and back", 1.0), ("-200 deg and back", -1.0)] {
+        let mut rows = Rows::of(name);
         let (torques, rotational, beside) = torques(sense);
         let limit = rotational * SATURATION;
         // Against the turn: never with it.
@@ -66,12 +67,7 @@ pub fn run() -> Vec<Row> {
             .iter()
             .map(|(_, torque)| torque * sense)
             .fold(f64::NEG_INFINITY, f64::max);
-        rows.push(Row::at_most(
-            format!("{name}: torque with the turn"),
-            wrong.max(0.0),
-            0.0,
-            "N m",
-        ));
+        rows.at_most("torque with the turn", wrong.max(0.0), 0.0, "N m");
         // K_r times the angle, up to the saturation: monotone, then constant.
         let error = torques
             .iter()
@@ -80,29 +76,15 @@ pub fn run() -> Vec<Row> {
                 (torque - ideal).abs() / limit
             })
             .fold(0.0, f64::max);
-        rows.push(Row::at_most(
-            format!("{name}: error of K_r angle, saturated at 1 rad"),
-            error,
-            SAME,
-            "",
-        ));
+        rows.at_most("error of K_r angle, saturated at 1 rad", error, SAME, "");
         let jump = torques
             .windows(2)
             .map(|pair| (pair[1].1 - pair[0].1).abs())
             .fold(0.0, f64::max);
         let allowed = 1.5 * rotational * SPEED * PERIOD.as_secs_f64();
-        rows.push(Row::at_most(
-            format!("{name}: largest change of torque per ms"),
-            jump,
-            allowed,
-            "N m",
-        ));
-        rows.push(Row::at_most(
-            format!("{name}: force and other torque"),
-            beside / limit,
-            SAME,
-            "",
-        ));
+        rows.at_most("largest change of torque per ms", jump, allowed, "N m");
+        rows.at_most("force and other torque", beside / limit, SAME, "");
+        all.extend(rows.all);
     }
-    rows
+    all
 }

@@ -7,10 +7,11 @@ use god_object::{Pose, Vector6};
 use nalgebra::{Point3, Vector3};
 use taut_bridge::{
     Command, Device, DeviceFault, DeviceInfo, DevicePort, DeviceSample, EventKind, SafetySettings,
+    TickReport,
 };
 
-use crate::Row;
 use crate::closed_loop::PERIOD;
+use crate::row::{Row, Rows};
 
 /// Direction that limits may turn a wrench by, deg: rounding.
 const EXACT_DEG: f64 = 1e-5;
@@ -68,37 +69,22 @@ fn port(speed: f64) -> DevicePort {
 /// Direction, norms, and contact.
 #[must_use]
 pub fn run() -> Vec<Row> {
-    let mut rows = saturated();
+    let mut all = saturated();
+    let told = |acts| if acts { "acts" } else { "does not act" };
     // R11's speeds, and one between: up to 1 N/ms.
     for speed in [0.05, 0.3, 0.6, 1.0] {
+        let mut rows = Rows::of(format!("1000 N/m at {speed} m/s"));
         let (differs, acts) = contact(speed);
-        rows.push(Row::at_most(
-            format!("1000 N/m at {speed} m/s: rendered - commanded"),
-            differs,
-            0.0,
-            "N",
-        ));
-        rows.push(Row::holds(
-            format!("1000 N/m at {speed} m/s: slew limit"),
-            if acts { "acts" } else { "does not act" },
-            "does not act",
-            !acts,
-        ));
+        rows.at_most("rendered - commanded", differs, 0.0, "N");
+        rows.holds("slew limit", told(acts), told(false), !acts);
+        all.extend(rows.all);
     }
+    let mut rows = Rows::of("20 N at once on a hand that rests");
     let (step, acts) = unexplained();
-    rows.push(Row::at_most(
-        "20 N at once on a hand that rests: largest step",
-        step,
-        0.5 + 1e-9,
-        "N/ms",
-    ));
-    rows.push(Row::holds(
-        "20 N at once on a hand that rests: slew limit",
-        if acts { "acts" } else { "does not act" },
-        "acts",
-        acts,
-    ));
-    rows
+    rows.at_most("largest step", step, 0.5 + 1e-9, "N/ms");
+    rows.holds("slew limit", told(acts), told(true), acts);
+    all.extend(rows.all);
+    all
 }
 
 /// 100 N at 10 degrees from x, with 2 N m at 10 degrees from y.
@@ -143,6 +129,11 @@ fn saturated() -> Vec<Row> {
     rows
 }
 
+fn is_limited(report: &TickReport) -> bool {
+    let mut events = report.events.iter();
+    events.any(|event| event.kind == EventKind::ForceSlewLimited)
+}
+
 /// Meets the wall: largest difference of what is rendered from what is commanded, and whether the slew limit acted.
 fn contact(speed: f64) -> (f64, bool) {
     let mut port = port(speed);
@@ -156,10 +147,7 @@ fn contact(speed: f64) -> (f64, bool) {
             Some(Command::fresh(now, commanded))
         });
         largest = largest.max((report.wrench - commanded).norm());
-        acts |= report
-            .events
-            .iter()
-            .any(|event| event.kind == EventKind::ForceSlewLimited);
+        acts |= is_limited(&report);
         tick += 1;
     }
     (largest, acts)
@@ -175,10 +163,7 @@ fn unexplained() -> (f64, bool) {
         let report = port.tick(now, |_| Some(Command::fresh(now, asked)));
         largest = largest.max((report.wrench - before).norm());
         before = report.wrench;
-        acts |= report
-            .events
-            .iter()
-            .any(|event| event.kind == EventKind::ForceSlewLimited);
+        acts |= is_limited(&report);
     }
     (largest, acts)
 }

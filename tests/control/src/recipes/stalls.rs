@@ -17,8 +17,8 @@ use taut_bridge::{
 };
 use taut_scene::{BuiltScene, Scene};
 
-use crate::Row;
 use crate::closed_loop::PERIOD;
+use crate::row::{Row, Rows};
 
 /// Largest change of the force in a tick that the hand's motion does not explain, N, with rounding; and in a write after a gap.
 const UNEXPLAINED: f64 = 0.5 + 1e-9;
@@ -100,7 +100,7 @@ pub fn run() -> Vec<Row> {
 }
 
 fn judge(stalled: Stalled, milliseconds: u32, seen: &Seen) -> Vec<Row> {
-    let case = format!("{stalled:?} for {milliseconds} ms");
+    let mut rows = Rows::of(format!("{stalled:?} for {milliseconds} ms"));
     let kept = seen.lowest / seen.before;
     let missed = match stalled {
         Stalled::Haptics => u64::from(milliseconds),
@@ -112,49 +112,36 @@ fn judge(stalled: Stalled, milliseconds: u32, seen: &Seen) -> Vec<Row> {
         Stalled::Haptics => AFTER_A_GAP,
         _ => UNEXPLAINED + EXPLAINED * seen.largest_travel,
     };
-    let mut rows = vec![
-        Row::at_most(
-            format!("{case}: largest step"),
-            seen.largest_step,
-            allowed,
-            "N",
-        ),
-        Row::holds(
-            format!("{case}: ticks of the haptics loop in 400 ms"),
-            seen.haptics_ticks,
-            ticks,
-            seen.haptics_ticks == ticks,
-        ),
-    ];
-    let held = Row::holds(
-        format!("{case}: force held"),
-        &share,
-        "> 90 % of more than 2 N",
-        kept > 0.9 && seen.before > 2.0,
+    rows.at_most("largest step", seen.largest_step, allowed, "N");
+    rows.holds(
+        "ticks of the haptics loop in 400 ms",
+        seen.haptics_ticks,
+        ticks,
+        seen.haptics_ticks == ticks,
     );
+    let pressed = seen.before > 2.0;
     match stalled {
-        Stalled::GodObject => {
-            rows.push(held);
-            rows.push(Row::holds(
-                format!("{case}: age of the constraints told"),
-                format!("{} ms", seen.oldest_ms),
-                format!(">= {milliseconds} ms"),
-                seen.oldest_ms >= milliseconds,
-            ));
-        }
         // 20 ms are held; of 100 ms, 80 have faded.
-        Stalled::Coupling if milliseconds > 20 => rows.push(Row::holds(
-            format!("{case}: force fades"),
-            &share,
-            "< 25 % of more than 2 N",
-            kept < 0.25 && seen.before > 2.0,
-        )),
-        Stalled::Coupling => rows.push(held),
+        Stalled::Coupling if milliseconds > 20 => {
+            let fades = kept < 0.25 && pressed;
+            rows.holds("force fades", share, "< 25 % of more than 2 N", fades);
+        }
         // Held by the device until the port is called again; a longer gap than its hold, the port has to tell and ramp in.
-        Stalled::Haptics if milliseconds < 20 => rows.push(held),
-        Stalled::Haptics => {}
+        Stalled::Haptics if milliseconds >= 20 => {}
+        _ => {
+            let held = kept > 0.9 && pressed;
+            rows.holds("force held", share, "> 90 % of more than 2 N", held);
+        }
     }
-    rows
+    if stalled == Stalled::GodObject {
+        rows.holds(
+            "age of the constraints told",
+            format!("{} ms", seen.oldest_ms),
+            format!(">= {milliseconds} ms"),
+            seen.oldest_ms >= milliseconds,
+        );
+    }
+    rows.all
 }
 
 /// `None` where the shipped scene cannot be built.

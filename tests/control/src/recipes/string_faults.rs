@@ -11,7 +11,7 @@ use taut_spidar::{
 };
 use taut_test_kit::strings::{Random, apart, motion};
 
-use crate::Row;
+use crate::row::{Row, Rows};
 
 /// Error of a miscalibrated string, m.
 const SLIP: f64 = 1e-3;
@@ -23,24 +23,29 @@ const DIRECTION: f64 = 1e-3;
 /// Every fault on every geometry.
 #[must_use]
 pub fn run() -> Vec<Row> {
-    let mut rows = Vec::new();
+    let mut all = Vec::new();
     for geometry in Geometry::shipped_names().filter_map(Geometry::shipped) {
-        rows.extend(infeasible(&geometry));
-        rows.extend(dead_motor(&geometry));
-        rows.push(unknown_motor(&geometry));
-        rows.extend(slipped(&geometry));
-        rows.extend(slack(&geometry));
-        rows.push(turned_too_far(&geometry));
-        rows.push(near_a_motor(&geometry));
-        rows.extend(not_a_number(&geometry));
-        rows.push(at_rest(&geometry));
+        let mut rows = Rows::of(&geometry.name);
+        for fault in [
+            infeasible,
+            dead_motor,
+            unknown_motor,
+            slipped,
+            slack,
+            turned_too_far,
+            near_a_motor,
+            not_a_number,
+            at_rest,
+        ] {
+            fault(&geometry, &mut rows);
+        }
+        all.extend(rows.all);
     }
-    rows
+    all
 }
 
 /// A wrench outside the feasible set keeps its direction, is as large as it can be, and is flagged.
-fn infeasible(geometry: &Geometry) -> Vec<Row> {
-    let name = &geometry.name;
+fn infeasible(geometry: &Geometry, rows: &mut Rows) {
     let arm = geometry.arm();
     let mut solver = solver(geometry);
     let mut random = Random(11);
@@ -65,25 +70,18 @@ fn infeasible(geometry: &Geometry) -> Vec<Row> {
         let bigger = solver.feasible_scale(&strings, &more);
         not_largest += u32::from(bigger.is_none_or(|scale| scale >= 0.995));
     }
-    vec![
-        Row::at_most(
-            format!("{name}: infeasible wrench, error of direction"),
-            worst,
-            DIRECTION,
-            "of it",
-        ),
-        Row::holds(
-            format!("{name}: infeasible wrenches of 1000"),
-            format!("{scaled} scaled, {unflagged} not flagged, {not_largest} too small"),
-            "> 800 scaled, none of the others",
-            scaled > 800 && unflagged == 0 && not_largest == 0,
-        ),
-    ]
+    let what = "infeasible wrench, error of direction";
+    rows.at_most(what, worst, DIRECTION, "of it");
+    rows.holds(
+        "infeasible wrenches of 1000",
+        format!("{scaled} scaled, {unflagged} not flagged, {not_largest} too small"),
+        "> 800 scaled, none of the others",
+        scaled > 800 && unflagged == 0 && not_largest == 0,
+    );
 }
 
 /// With a motor dead, the nearest wrench is rendered, and flagged where it is not the one that was asked for.
-fn dead_motor(geometry: &Geometry) -> Vec<Row> {
-    let name = &geometry.name;
+fn dead_motor(geometry: &Geometry, rows: &mut Rows) {
     let arm = geometry.arm();
     let mut random = Random(12);
     let (mut pulled, mut residual, mut worst) = (0.0_f64, 0.0_f64, 0.0_f64);
@@ -111,49 +109,35 @@ fn dead_motor(geometry: &Geometry) -> Vec<Row> {
         }
         motors_with_both += usize::from(exact > 0 && flagged > 0);
     }
-    vec![
-        Row::at_most(format!("{name}: dead motor, its tension"), pulled, 0.0, "N"),
-        Row::at_most(
-            format!("{name}: dead motor, KKT residual"),
-            residual,
-            1e-10,
-            "",
-        ),
-        Row::at_most(
-            format!("{name}: dead motor, error of wrenches that are not flagged"),
-            worst,
-            1e-3,
-            "of it",
-        ),
-        Row::holds(
-            format!("{name}: dead motor, motors with wrenches of both kinds"),
-            motors_with_both,
-            STRINGS,
-            motors_with_both == STRINGS,
-        ),
-    ]
+    rows.at_most("dead motor, its tension", pulled, 0.0, "N");
+    rows.at_most("dead motor, KKT residual", residual, 1e-10, "");
+    let what = "dead motor, error of wrenches that are not flagged";
+    rows.at_most(what, worst, 1e-3, "of it");
+    rows.holds(
+        "dead motor, motors with wrenches of both kinds",
+        motors_with_both,
+        STRINGS,
+        motors_with_both == STRINGS,
+    );
 }
 
 /// A motor of unknown pull states what it may add.
-fn unknown_motor(geometry: &Geometry) -> Row {
+fn unknown_motor(geometry: &Geometry, rows: &mut Rows) {
     let mut solver = solver(geometry);
     solver.set_motor(3, MotorState::Unknown);
     let strings = StringMatrix::at(geometry, &Pose::identity());
     let answer = solver.distribute(&strings, &Vector6::zeros());
-    Row::holds(
-        format!("{}: motor of unknown pull, stated", geometry.name),
-        format!(
-            "{} N, commanded {} N",
-            answer.uncertainty, answer.tensions[3]
-        ),
+    let (stated, commanded) = (answer.uncertainty, answer.tensions[3]);
+    rows.holds(
+        "motor of unknown pull, stated",
+        format!("{stated} N, commanded {commanded} N"),
         format!("{} N, commanded 0 N", geometry.tension_max),
-        answer.uncertainty == geometry.tension_max && answer.tensions[3] == 0.0,
-    )
+        stated == geometry.tension_max && commanded == 0.0,
+    );
 }
 
 /// A millimetre on one string of a moving device is noticed, and the string is named.
-fn slipped(geometry: &Geometry) -> Vec<Row> {
-    let name = &geometry.name;
+fn slipped(geometry: &Geometry, rows: &mut Rows) {
     let (mut latest, mut unnamed, mut innocents, mut worst) = (0, 0, 0, 0.0_f64);
     for bad in 0..STRINGS {
         let start = motion(0.0, reach(geometry), 0.5);
@@ -194,31 +178,23 @@ fn slipped(geometry: &Geometry) -> Vec<Row> {
         latest = latest.max(alarmed);
         unnamed += u32::from(!named);
     }
-    vec![
-        Row::holds(
-            format!("{name}: string 1 mm off, alarm at the latest"),
-            format!("{} ms after", latest.saturating_sub(SLIPS.0)),
-            format!("< {} ms", SLIPS.1 - SLIPS.0),
-            latest < SLIPS.1,
-        ),
-        Row::holds(
-            format!("{name}: string 1 mm off, named"),
-            format!("{unnamed} of 8 not, {innocents} times another"),
-            "0 and 0",
-            unnamed == 0 && innocents == 0,
-        ),
-        Row::at_most(
-            format!("{name}: string 1 mm off, its size"),
-            worst * 1e3,
-            0.1,
-            "mm off",
-        ),
-    ]
+    rows.holds(
+        "string 1 mm off, alarm at the latest",
+        format!("{} ms after", latest.saturating_sub(SLIPS.0)),
+        format!("< {} ms", SLIPS.1 - SLIPS.0),
+        latest < SLIPS.1,
+    );
+    rows.holds(
+        "string 1 mm off, named",
+        format!("{unnamed} of 8 not, {innocents} times another"),
+        "0 and 0",
+        unnamed == 0 && innocents == 0,
+    );
+    rows.at_most("string 1 mm off, its size", worst * 1e3, 0.1, "mm off");
 }
 
 /// A slack string shows, and the others still give the pose.
-fn slack(geometry: &Geometry) -> Vec<Row> {
-    let name = &geometry.name;
+fn slack(geometry: &Geometry, rows: &mut Rows) {
     let start = Pose::identity();
     let mut strings =
         SimulatedStrings::new(geometry, StringLosses::default(), start).measuring_tensions();
@@ -235,12 +211,7 @@ fn slack(geometry: &Geometry) -> Vec<Row> {
         );
     }
     let Ok(reading) = strings.read_counts(Duration::from_millis(200)) else {
-        return vec![Row::holds(
-            format!("{name}: slack string"),
-            "no counts",
-            "counts",
-            false,
-        )];
+        return rows.holds("slack string", "no counts", "counts", false);
     };
     let tension = reading.tensions.map_or(f64::NAN, |tensions| tensions[0]);
     let lengths = encoders.lengths(&reading.counts);
@@ -256,36 +227,21 @@ fn slack(geometry: &Geometry) -> Vec<Row> {
     kinematics.use_string(1, false);
     kinematics.use_string(2, false);
     let few = kinematics.solve(&lengths).err();
-    vec![
-        Row::holds(
-            format!("{name}: slack string, its tension"),
-            format!("{tension:.2} N"),
-            format!("< {} N", geometry.tension_min),
-            tension < geometry.tension_min,
-        ),
-        Row::holds(
-            format!("{name}: slack string, lengths disagree"),
-            alarmed,
-            true,
-            alarmed,
-        ),
-        Row::at_most(
-            format!("{name}: slack string, pose from the others"),
-            off,
-            5.0,
-            "counts",
-        ),
-        Row::holds(
-            format!("{name}: five strings"),
-            format!("{few:?}"),
-            "Some(TooFewStrings(5))",
-            few == Some(StringFault::TooFewStrings(5)),
-        ),
-    ]
+    rows.holds(
+        "slack string, its tension",
+        format!("{tension:.2} N"),
+        format!("< {} N", geometry.tension_min),
+        tension < geometry.tension_min,
+    );
+    rows.holds("slack string, lengths disagree", alarmed, true, alarmed);
+    rows.at_most("slack string, pose from the others", off, 5.0, "counts");
+    let expected = Some(StringFault::TooFewStrings(5));
+    let (found, right) = (format!("{few:?}"), few == expected);
+    rows.holds("five strings", found, format!("{expected:?}"), right);
 }
 
 /// A grip turned beyond a right angle is a fault, and before it none.
-fn turned_too_far(geometry: &Geometry) -> Row {
+fn turned_too_far(geometry: &Geometry, rows: &mut Rows) {
     let axis = Vector3::new(0.2, 0.9, 0.1);
     let axis = axis / axis.norm();
     let mut kinematics = ForwardKinematics::new(geometry);
@@ -303,17 +259,17 @@ fn turned_too_far(geometry: &Geometry) -> Row {
         }
     }
     let degrees = fault_at.to_degrees();
-    Row::holds(
-        format!("{}: turned too far", geometry.name),
+    rows.holds(
+        "turned too far",
         format!("fault at {degrees:.1} degrees, {off:.1e} rad off before"),
         "86 to 91 degrees, < 1e-6 rad",
         (1.5..=std::f64::consts::FRAC_PI_2 + 0.6_f64.to_radians()).contains(&fault_at)
             && off < 1e-6,
-    )
+    );
 }
 
 /// A grip near a motor is a fault.
-fn near_a_motor(geometry: &Geometry) -> Row {
+fn near_a_motor(geometry: &Geometry, rows: &mut Rows) {
     // The hole of the grip moves to motor 5.
     let to = geometry.motors[5] - geometry.grips[5];
     let mut kinematics = ForwardKinematics::new(geometry);
@@ -334,17 +290,11 @@ fn near_a_motor(geometry: &Geometry) -> Row {
         || "no fault".to_owned(),
         |(length, fault)| format!("{:.1} mm: {fault}", length * 1e3),
     );
-    Row::holds(
-        format!("{}: near motor 6", geometry.name),
-        measured,
-        "8 to 10 mm, motor 6",
-        right,
-    )
+    rows.holds("near motor 6", measured, "8 to 10 mm, motor 6", right);
 }
 
 /// What is not a number is a fault, and pulls no harder than pretension.
-fn not_a_number(geometry: &Geometry) -> Vec<Row> {
-    let name = &geometry.name;
+fn not_a_number(geometry: &Geometry, rows: &mut Rows) {
     let mut kinematics = ForwardKinematics::new(geometry);
     let good = geometry.lengths(&Pose::identity());
     let mut lengths = good;
@@ -353,25 +303,23 @@ fn not_a_number(geometry: &Geometry) -> Vec<Row> {
     let goes_on = kinematics.solve(&good).is_ok();
     let strings = StringMatrix::at(geometry, &Pose::identity());
     let answer = solver(geometry).distribute(&strings, &(Vector6::x() * f64::NAN));
-    vec![
-        Row::holds(
-            format!("{name}: length not a number"),
-            format!("{fault:?}, the next one good: {goes_on}"),
-            "Some(NotFinite(4)), the next one good: true",
-            fault == Some(StringFault::NotFinite(4)) && goes_on,
-        ),
-        Row::holds(
-            format!("{name}: wrench not a number"),
-            format!("{:?}, {:.2} N", answer.status, answer.tensions[0]),
-            format!("NotFinite, {:.2} N", geometry.tension_min),
-            answer.status == TensionStatus::NotFinite
-                && answer.tensions == [geometry.tension_min; STRINGS],
-        ),
-    ]
+    rows.holds(
+        "length not a number",
+        format!("{fault:?}, the next one good: {goes_on}"),
+        "Some(NotFinite(4)), the next one good: true",
+        fault == Some(StringFault::NotFinite(4)) && goes_on,
+    );
+    rows.holds(
+        "wrench not a number",
+        format!("{:?}, {:.2} N", answer.status, answer.tensions[0]),
+        format!("NotFinite, {:.2} N", geometry.tension_min),
+        answer.status == TensionStatus::NotFinite
+            && answer.tensions == [geometry.tension_min; STRINGS],
+    );
 }
 
 /// At rest a millimetre raises the alarm at the centre, and never is an innocent string named.
-fn at_rest(geometry: &Geometry) -> Row {
+fn at_rest(geometry: &Geometry, rows: &mut Rows) {
     let mut random = Random(31);
     let (mut innocents, mut silent) = (0, 0);
     for bad in 0..STRINGS {
@@ -392,12 +340,12 @@ fn at_rest(geometry: &Geometry) -> Row {
             }
         }
     }
-    Row::holds(
-        format!("{}: string 1 mm off at rest", geometry.name),
+    rows.holds(
+        "string 1 mm off at rest",
         format!("{silent} samples without alarm, {innocents} innocents named"),
         "0 and 0",
         silent == 0 && innocents == 0,
-    )
+    );
 }
 
 fn solver(geometry: &Geometry) -> TensionSolver {

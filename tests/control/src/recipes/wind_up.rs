@@ -13,8 +13,8 @@ use nalgebra::Vector3;
 use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::shapes::cuboid;
 
-use crate::Row;
 use crate::closed_loop::PERIOD;
+use crate::row::{Row, Rows};
 
 /// Half extents of the bar, m.
 const BAR: [f64; 3] = [0.05, 0.005, 0.005];
@@ -133,58 +133,38 @@ fn lead(whole_turn: f64) -> (Seen, f64) {
 #[must_use]
 pub fn run() -> Vec<Row> {
     let play = 2.0 * CLEARANCE / BAR[0];
-    let mut rows = Vec::new();
+    let mut all = Vec::new();
     for turn in TURNS {
         let (seen, rotational) = lead(turn);
         // The bound of the conventions, 1.5 K v T, for the turn; at a whole turn the bar changes stops, across its play, and may do so in one update.
         let crossed = if turn < TAU { 0.0 } else { play };
         let allowed = rotational * 1.5 * (SPEED * PERIOD.as_secs_f64() + crossed);
-        let degrees = turn.to_degrees().round();
-        let mut at_most = |case: &str, measured: f64, limit: f64, unit: &str| {
-            let case = format!("{degrees} deg: {case}");
-            rows.push(Row::at_most(case, measured, limit, unit));
-        };
-        at_most("turn of the bar in the slot", seen.in_slot, play, "rad");
+        let mut rows = Rows::of(format!("{} deg", turn.to_degrees().round()));
+        rows.at_most("turn of the bar in the slot", seen.in_slot, play, "rad");
         // Where less than 0.1 rad is left to a whole turn, the shorter arc pulls.
         let least = if turn < TAU { 0.0 } else { 0.1 * rotational };
-        at_most("torque with the wind-up", seen.wrong_torque, least, "N m");
-        at_most(
-            "change of torque per ms, wound",
-            seen.torque_step,
-            allowed,
-            "N m",
-        );
-        at_most(
-            "largest turn in one update",
-            seen.largest_turn,
-            FRAC_PI_2,
-            "rad",
-        );
-        at_most("from the device at the end", seen.left, SAME, "rad");
-        at_most("turns in the last second", seen.at_end, SAME, "rad");
-        at_most(
-            "sub-steps of an update in the last second",
-            f64::from(seen.busy),
-            1.0,
-            "",
-        );
+        rows.at_most("torque with the wind-up", seen.wrong_torque, least, "N m");
+        let step = seen.torque_step;
+        rows.at_most("change of torque per ms, wound", step, allowed, "N m");
+        let largest = seen.largest_turn;
+        rows.at_most("largest turn in one update", largest, FRAC_PI_2, "rad");
+        rows.at_most("from the device at the end", seen.left, SAME, "rad");
+        rows.at_most("turns in the last second", seen.at_end, SAME, "rad");
+        let busy = f64::from(seen.busy);
+        rows.at_most("sub-steps of an update in the last second", busy, 1.0, "");
         // Within the slot's play at each half turn, and from there the way that the device went beyond whole ones.
         let returned = turn % TAU;
-        let name = "turns in all, about any axis";
-        at_most(name, seen.way, returned + 8.0 * play, "rad");
-        let case = format!("{degrees} deg: turn of the bar about z");
-        rows.push(Row::holds(
-            case,
+        let most = returned + 8.0 * play;
+        rows.at_most("turns in all, about any axis", seen.way, most, "rad");
+        rows.holds(
+            "turn of the bar about z",
             format!("{:.5} rad", seen.turned),
             format!("{returned:.5} rad"),
             (seen.turned - returned).abs() <= SAME,
-        ));
-        rows.push(Row::holds(
-            format!("{degrees} deg: gap"),
-            format!("{:.2e} m above the least", seen.gap),
-            ">= 0",
-            seen.gap >= 0.0,
-        ));
+        );
+        let gap = format!("{:.2e} m above the least", seen.gap);
+        rows.holds("gap", gap, ">= 0", seen.gap >= 0.0);
+        all.extend(rows.all);
     }
-    rows
+    all
 }
