@@ -9,14 +9,13 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use god_object::GodObject;
 use taut::loops::wiring::WiredLoops;
 use taut::session::edge_sets::EdgeSets;
 use taut_bridge::edge::{EdgeCoupler, offer_of};
 use taut_bridge::{
     ArmWish, BridgeLoop, CommandSource, DEFAULT_MAX_AGE, DeviceLimits, DevicePort, EventKind, Grip,
     Hand, MAX_EDGE_DELAY, MinJerkPath, Passivity, PassivitySettings, Pose, RemoteDevice,
-    SafetySettings, SimulatedDevice, ValidationSettings, ViaPoint,
+    SafetySettings, SimulatedDevice, ValidationSettings,
 };
 use taut_link::DeviceInput;
 use taut_method_tests::hand::Random;
@@ -26,9 +25,9 @@ use taut_proto::{
     WrenchCommand,
 };
 
-use crate::edge::Mode;
+use crate::edge::{Mode, god_object};
 use crate::edge_network::{Impairment, Way};
-use crate::edge_scenes::Task;
+use crate::edge_scenes::{Task, path};
 
 /// Both ends tick this often.
 const TICK: Duration = Duration::from_millis(1);
@@ -90,9 +89,7 @@ impl Growth {
         };
         (grown.min(self.most.as_secs_f64()) * 1e9) as u64
     }
-}
 
-impl Growth {
     fn jumped(&self, seed: u64, elapsed: f64) -> f64 {
         let mut random = Random(seed);
         let mut until = 0.0;
@@ -151,7 +148,7 @@ impl Rubbing {
     pub fn on_wall() -> Self {
         Self::along(
             Task::wall(),
-            &[
+            [
                 [0.0, 0.0, 0.04],
                 [0.0, 0.0, -0.015],
                 [0.06, 0.0, -0.01],
@@ -164,7 +161,7 @@ impl Rubbing {
     pub fn over_dome() -> Self {
         Self::along(
             Task::dome(),
-            &[
+            [
                 [-0.05, 0.0, 0.08],
                 [-0.018, 0.0, 0.018],
                 [0.018, 0.0, 0.018],
@@ -176,16 +173,9 @@ impl Rubbing {
     /// Holds still while a plate comes up at 0.1 m/s, lifts and tilts what is held and goes down again: the shipped scene, softer by hand.
     pub fn lifted_by_plate() -> Self {
         let start = Pose::translation(0.0, 0.0, 0.030);
-        let still = |time_s| ViaPoint {
-            time_s,
-            pose: start,
-        };
-        match MinJerkPath::new(vec![still(0.0), still(8.0)], true) {
-            Ok(path) => Self {
-                task: Task::plate(),
-                path,
-            },
-            Err(error) => panic!("{error}"),
+        Self {
+            task: Task::plate(),
+            path: path(&[(0.0, start), (8.0, start)], true),
         }
     }
 
@@ -201,16 +191,10 @@ impl Rubbing {
 
     /// Heights (m) over a wall at these times (s).
     fn down_on_wall(heights: &[(f64, f64)]) -> Self {
-        let via = |&(time_s, z): &(f64, f64)| ViaPoint {
-            time_s,
-            pose: Pose::translation(0.0, 0.0, z),
-        };
-        match MinJerkPath::new(heights.iter().map(via).collect(), false) {
-            Ok(path) => Self {
-                task: Task::wall(),
-                path,
-            },
-            Err(error) => panic!("{error}"),
+        let via = |(time, z): &(f64, f64)| (*time, Pose::translation(0.0, 0.0, *z));
+        Self {
+            task: Task::wall(),
+            path: path(&heights.iter().map(via).collect::<Vec<_>>(), false),
         }
     }
 
@@ -220,24 +204,18 @@ impl Rubbing {
         Self { task, path }
     }
 
-    fn along(task: Task, places: &[[f64; 3]; 4]) -> Self {
-        let via = |time_s, place: &[f64; 3]| ViaPoint {
-            time_s,
-            pose: Pose::translation(place[0], place[1], place[2]),
-        };
-        let [first, pressed, slid, lifted] = places;
-        let points = vec![
-            via(0.0, first),
-            via(0.5, pressed),
-            via(0.9, slid),
-            via(1.2, lifted),
-            via(1.5, slid),
-            via(2.0, first),
+    fn along(task: Task, places: [[f64; 3]; 4]) -> Self {
+        let [first, pressed, slid, lifted] = places.map(|[x, y, z]| Pose::translation(x, y, z));
+        let points = [
+            (0.0, first),
+            (0.5, pressed),
+            (0.9, slid),
+            (1.2, lifted),
+            (1.5, slid),
+            (2.0, first),
         ];
-        match MinJerkPath::new(points, true) {
-            Ok(path) => Self { task, path },
-            Err(error) => panic!("{error}"),
-        }
+        let path = path(&points, true);
+        Self { task, path }
     }
 }
 
@@ -256,8 +234,7 @@ pub fn run_with(
     duration: Duration,
 ) -> Outcome {
     let near = Impairment::new(0.3, 0.0);
-    let (mut up, mut down) = (Way::new(near, 11), Way::new(near, 12));
-    let mut nowhere = Way::new(near, 13);
+    let [mut up, mut down] = [11, 12].map(|seed| Way::new(near, seed));
     let mut server = Server::new(&rubbing.task);
     let mut bridge = Bridge::new(rubbing, mode, passivity);
     let mut outcome = Outcome {
@@ -270,19 +247,18 @@ pub fn run_with(
     let ticks = (duration.as_secs_f64() / TICK.as_secs_f64()) as u32;
     for tick in 1..=ticks {
         let now = TICK * tick;
-        up.set_delay(near.delay_ns + growth.delay_ns(now, 0));
-        down.set_delay(near.delay_ns + growth.delay_ns(now, 1));
-        let lost = [0, 1].map(|way| growth.loses(now, way));
-        let to_server = if lost[0] { &mut nowhere } else { &mut up };
-        let felt = bridge.tick(tick, now, &mut down, to_server, &mut outcome.events);
+        for (index, way) in [&mut up, &mut down].into_iter().enumerate() {
+            way.set_delay(near.delay_ns + growth.delay_ns(now, index));
+            way.loses_all = growth.loses(now, index);
+        }
+        let felt = bridge.tick(tick, now, &mut down, &mut up, &mut outcome.events);
         outcome.age_at_end = bridge.newest_data.map_or(now, |taken| now - taken);
         if felt > 0.0 {
             let after = usize::from(now >= growth.begin);
             outcome.largest[after] = outcome.largest[after].max(felt);
             outcome.oldest = outcome.oldest.max(outcome.age_at_end);
         }
-        let to_bridge = if lost[1] { &mut nowhere } else { &mut down };
-        server.tick(now, &mut up, to_bridge);
+        server.tick(now, &mut up, &mut down);
     }
     outcome.given = bridge.of.port().energy().injected();
     outcome
@@ -307,8 +283,7 @@ pub fn felt_under(
     ticks: u32,
 ) -> (Vec<f64>, Vec<EventKind>) {
     let near = Impairment::new(0.3 + disturbance.delay_ms, 0.0);
-    let (mut up, mut down) = (Way::new(near, 11), Way::new(near, 12));
-    let mut nowhere = Way::new(near, 13);
+    let [mut up, mut down] = [11, 12].map(|seed| Way::new(near, seed));
     let mut server = Server::new(&rubbing.task);
     let mut bridge = Bridge::new(rubbing, mode, Passivity::Observe);
     let (mut felt, mut events) = (Vec::new(), Vec::new());
@@ -316,11 +291,10 @@ pub fn felt_under(
         let wished = disturbance.wishes.iter().filter(|(at, _)| *at == tick);
         wished.for_each(|(_, wish)| server.loops.arm_switch.wish(*wish));
         let now = TICK * tick;
-        let lost = [0, 1].map(|way| disturbance.lost[way].contains(&tick));
-        let to_server = if lost[0] { &mut nowhere } else { &mut up };
-        felt.push(bridge.tick(tick, now, &mut down, to_server, &mut events));
-        let to_bridge = if lost[1] { &mut nowhere } else { &mut down };
-        server.tick(now, &mut up, to_bridge);
+        up.loses_all = disturbance.lost[0].contains(&tick);
+        down.loses_all = disturbance.lost[1].contains(&tick);
+        felt.push(bridge.tick(tick, now, &mut down, &mut up, &mut events));
+        server.tick(now, &mut up, &mut down);
     }
     (felt, events)
 }
@@ -338,8 +312,6 @@ impl Server {
     fn new(task: &Task) -> Self {
         let scene = &task.scene;
         let world = Arc::new(scene.world.clone());
-        let god_object = GodObject::new(world.clone(), scene.settings, scene.start)
-            .unwrap_or_else(|error| panic!("{error}"));
         let (inputs, output) = triple_buffer::TripleBuffer::new(&None).split();
         let (device, wrenches) =
             RemoteDevice::new(output, DeviceLimits::UNLIMITED, DEFAULT_MAX_AGE);
@@ -356,7 +328,7 @@ impl Server {
             loops: WiredLoops::new(
                 &world,
                 &scene.settings,
-                god_object,
+                god_object(task),
                 Box::new(device),
                 safety,
                 None,

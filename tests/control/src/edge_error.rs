@@ -8,7 +8,8 @@
 //! for 7 % of forces below 1.4 N, 7.6 mN m for 12.7 % of torques below 60 mN m. So a force where there should be none counts, too.
 //! Sources: direction, Barbagli et al. (congruent vision); force, Pang, Tan and Durlach 1991; torque, Jandura and Srinivasan 1994.
 
-use nalgebra::{Vector3, Vector6};
+use god_object::spatial::{angular, linear};
+use nalgebra::Vector6;
 
 /// Just-noticeable change of a force's direction, rad.
 const DIRECTION: f64 = 18.4 / 180.0 * std::f64::consts::PI;
@@ -25,14 +26,8 @@ const DIRECTED: f64 = 0.1;
 
 /// The error of `wrench` against `ideal` in just-noticeable differences.
 pub fn jnd(wrench: &Vector6<f64>, ideal: &Vector6<f64>) -> f64 {
-    let (force, right): (Vector3<f64>, Vector3<f64>) = (
-        wrench.fixed_rows::<3>(0).into(),
-        ideal.fixed_rows::<3>(0).into(),
-    );
-    let (torque, right_torque): (Vector3<f64>, Vector3<f64>) = (
-        wrench.fixed_rows::<3>(3).into(),
-        ideal.fixed_rows::<3>(3).into(),
-    );
+    let (force, right) = (linear(wrench), linear(ideal));
+    let (torque, right_torque) = (angular(wrench), angular(ideal));
     let by_force = (force.norm() - right.norm()).abs() / (FORCE * right.norm()).max(LEAST_FORCE);
     let by_torque =
         (torque - right_torque).norm() / (TORQUE * right_torque.norm().max(MEASURED_TORQUE));

@@ -37,6 +37,8 @@ pub struct Way {
     under_way: Vec<(u64, u64, Vec<u8>)>,
     sends: u64,
     bytes: u64,
+    /// What is sent now is lost, and leaves no trace in what comes later.
+    pub(crate) loses_all: bool,
 }
 
 impl Way {
@@ -51,6 +53,7 @@ impl Way {
             under_way: Vec::new(),
             sends: 0,
             bytes: 0,
+            loses_all: false,
         }
     }
 
@@ -61,6 +64,9 @@ impl Way {
 
     /// Seals `payload` and lets it go at `now_ns`.
     pub fn send(&mut self, now_ns: u64, payload: &Payload) {
+        if self.loses_all {
+            return;
+        }
         let mut buffer = [0; MAX_DATAGRAM_BYTES];
         let datagram = match self.sealer.seal(payload, &mut buffer) {
             Ok(datagram) => datagram.to_vec(),

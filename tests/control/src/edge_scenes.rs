@@ -169,9 +169,12 @@ fn build(scene: Result<Scene, taut_scene::SceneError>) -> BuiltScene {
 }
 
 fn intention(points: &[(f64, Pose)]) -> MinJerkPath {
-    let via = points.iter().map(|(time_s, pose)| ViaPoint {
-        time_s: *time_s,
-        pose: *pose,
-    });
-    MinJerkPath::new(via.collect(), false).unwrap_or_else(|error| panic!("{error}"))
+    path(points, false)
+}
+
+/// Through poses at times, s; again and again with `repeats`.
+pub(crate) fn path(points: &[(f64, Pose)], repeats: bool) -> MinJerkPath {
+    let via = |&(time_s, pose): &(f64, Pose)| ViaPoint { time_s, pose };
+    MinJerkPath::new(points.iter().map(via).collect(), repeats)
+        .unwrap_or_else(|error| panic!("{error}"))
 }
