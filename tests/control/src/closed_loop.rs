@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use god_object::{ConstraintSet, Coupling, Pose, Settings, Vector6, World};
 use nalgebra::Vector3;
-use taut_plant::{Grip, Plant};
+use taut_plant::{Grip, Hand, MinJerkPath, Motors, Plant};
 
 /// Period of the loop unless it says otherwise: 1 kHz.
 pub const PERIOD: Duration = Duration::from_millis(1);
@@ -73,6 +73,33 @@ impl ClosedLoop {
         self.plant.command(&(wrench + self.push));
         Answer { measured, wrench }
     }
+}
+
+/// A hand that means to stay there, a device, and motors whose force comes so much later, s.
+pub fn held(device: Grip, hand: Hand, there: Pose, delay: f64) -> Plant {
+    Plant::new(device, hand, MinJerkPath::hold(there))
+        .with_motors(Motors {
+            delay: Duration::from_secs_f64(delay),
+            lag: Duration::ZERO,
+        })
+        .with_longest_step(PERIOD)
+}
+
+/// The boundary between what dies away and what grows by bisection, between two stiffnesses and to a relative width.
+pub fn critical_stiffness(
+    [mut calm, mut wild]: [f64; 2],
+    width: f64,
+    grows: impl Fn(f64) -> bool,
+) -> f64 {
+    while wild / calm > 1.0 + width {
+        let middle = (calm * wild).sqrt();
+        if grows(middle) {
+            wild = middle;
+        } else {
+            calm = middle;
+        }
+    }
+    (calm * wild).sqrt()
 }
 
 /// From one pose to a later one nearby: m and rad, world axes.

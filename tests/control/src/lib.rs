@@ -6,12 +6,10 @@
 //! - [`row`]: what a recipe says.
 //! - [`walls`]: constraint sets made by hand, and a body to hold against them.
 //! - [`closed_loop`]: coupling, device and hand, tick by tick.
-//! - [`edge`] and its neighbours: the coupling next to the device, over a network.
 //! - [`faulty_device`]: a device that fails on cue, behind its port.
 //! - [`recipes`]: the recipes.
 //! - [`edge`]: coupling beside the device against shipping forces; its chart is the example `edge_coupling`.
 //! - [`delay`]: a whole session behind a network whose delay grows.
-//! - [`wall_table`]: the printed table of critical stiffness.
 
 pub mod closed_loop;
 pub mod delay;
@@ -22,7 +20,6 @@ pub mod edge_scenes;
 pub mod faulty_device;
 pub mod recipes;
 pub mod row;
-pub mod wall_table;
 pub mod walls;
 
 pub use row::Row;

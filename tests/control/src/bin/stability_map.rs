@@ -58,14 +58,6 @@ impl Panel {
     }
 }
 
-const STANDARD: Case = Case {
-    damping: 1.0,
-    virtual_damping: 0.0,
-    delay: 1e-3,
-    period: 1e-3,
-    hand: HandPreset::Released,
-};
-
 const PANELS: [Panel; 3] = [
     Panel {
         name: "delay",
@@ -74,7 +66,7 @@ const PANELS: [Panel; 3] = [
         to: 8.0,
         case: |ms| Case {
             delay: ms * 1e-3,
-            ..STANDARD
+            ..Case::STANDARD
         },
     },
     Panel {
@@ -85,7 +77,7 @@ const PANELS: [Panel; 3] = [
         case: |khz| Case {
             delay: 1e-3 / khz,
             period: 1e-3 / khz,
-            ..STANDARD
+            ..Case::STANDARD
         },
     },
     Panel {
@@ -95,7 +87,7 @@ const PANELS: [Panel; 3] = [
         to: 10.0,
         case: |damping| Case {
             damping,
-            ..STANDARD
+            ..Case::STANDARD
         },
     },
 ];

@@ -13,11 +13,10 @@ use std::time::Duration;
 
 use god_object::{Pose, Vector6};
 use taut_plant::stability::SampledLoop;
-use taut_plant::{Hand, HandPreset, MinJerkPath, Motors, Plant};
+use taut_plant::{Hand, HandPreset};
 
 use crate::Row;
-use crate::closed_loop::{ClosedLoop, PERIOD, grip};
-use crate::wall_table::{CRITICAL, CRITICAL_LIGHT, DELAYS};
+use crate::closed_loop::{ClosedLoop, PERIOD, critical_stiffness, grip, held};
 use crate::walls::{both_sides_of_x, contacts, cube, linear, stops_about_z};
 
 /// How near simulation and eigenvalues must be.
@@ -35,6 +34,20 @@ const SEARCH: [f64; 2] = [20.0, 500_000.0];
 /// Relative width at which the search ends.
 const SEARCH_WIDTH: f64 = 1e-3;
 
+/// The published table of critical stiffness, 0.2 kg, 1 kHz, nobody holds the device: delays of its columns, s.
+const DELAYS: [f64; 4] = [0.0, 0.5e-3, 1e-3, 2e-3];
+/// Damping of the device and of the wall, N s/m; critical stiffness at each delay, N/m.
+const CRITICAL: [(f64, f64, [f64; 4]); 6] = [
+    (1.0, 0.0, [2002.0, 1001.0, 668.0, 401.0]),
+    (1.0, 2.0, [5945.0, 2973.0, 1981.0, 1186.0]),
+    (1.0, 5.0, [11714.0, 5857.0, 3895.0, 2321.0]),
+    (1.0, 10.0, [20947.0, 10466.0, 6936.0, 4097.0]),
+    (5.0, 0.0, [10042.0, 5026.0, 3356.0, 2021.0]),
+    (5.0, 5.0, [19594.0, 9805.0, 6530.0, 3905.0]),
+];
+/// With a light hand (and 1 N s/m of the device): delay, s; critical stiffness, N/m.
+const CRITICAL_LIGHT: [(f64, f64); 2] = [(0.0, 10_024.0), (1e-3, 3347.0)];
+
 /// One case of the sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
@@ -51,6 +64,15 @@ pub struct Case {
 }
 
 impl Case {
+    /// 1 N s/m, 1 kHz, a tick of delay, nobody holds.
+    pub const STANDARD: Self = Self {
+        damping: 1.0,
+        virtual_damping: 0.0,
+        delay: 1e-3,
+        period: 1e-3,
+        hand: HandPreset::Released,
+    };
+
     /// K_crit of the sampled loop by its eigenvalues, N/m.
     pub fn by_eigenvalues(&self) -> f64 {
         let device = grip(self.damping);
@@ -67,14 +89,16 @@ impl Case {
 
     /// K_crit by simulation with the real coupling, N/m.
     pub fn by_simulation(&self) -> f64 {
-        critical(|stiffness| self.grows(stiffness))
+        critical_stiffness(SEARCH, SEARCH_WIDTH, |stiffness| self.grows(stiffness))
     }
 
     /// Whether 1 mm grows over 2 s.
     fn grows(&self, stiffness: f64) -> bool {
         let settings = linear(stiffness);
         let set = contacts(&settings, &both_sides_of_x());
-        let mut run = ClosedLoop::new(&cube(), &settings, set, self.plant());
+        let device = grip(self.damping);
+        let plant = held(device, self.hand.into(), Pose::identity(), self.delay);
+        let mut run = ClosedLoop::new(&cube(), &settings, set, plant);
         run.plant
             .place(Pose::translation(DISTURBANCE, 0.0, 0.0), Vector6::zeros());
         run.period = Duration::from_secs_f64(self.period);
@@ -82,16 +106,6 @@ impl Case {
         let mass = 0.2 + Hand::from(self.hand).mass;
         let frequency = (stiffness / mass).sqrt();
         grows(&mut run, 0, frequency)
-    }
-
-    fn plant(&self) -> Plant {
-        let path = MinJerkPath::hold(Pose::identity());
-        Plant::new(grip(self.damping), self.hand.into(), path)
-            .with_motors(Motors {
-                delay: Duration::from_secs_f64(self.delay),
-                lag: Duration::ZERO,
-            })
-            .with_longest_step(PERIOD)
     }
 }
 
@@ -118,34 +132,15 @@ fn grows(run: &mut ClosedLoop, axis: usize, frequency: f64) -> bool {
     late > early
 }
 
-/// The boundary between what dies away and what grows, by bisection.
-fn critical(grows: impl Fn(f64) -> bool) -> f64 {
-    let [mut calm, mut wild] = SEARCH;
-    while wild / calm > 1.0 + SEARCH_WIDTH {
-        let middle = (calm * wild).sqrt();
-        if grows(middle) {
-            wild = middle;
-        } else {
-            calm = middle;
-        }
-    }
-    (calm * wild).sqrt()
-}
-
 /// A wall that holds the body about z: the torque's loop, N m/rad.
 fn about_z(delay: f64) -> (f64, f64) {
     let device = grip(1.0);
     let world = cube();
     let inertia = world.body.inertia[(2, 2)];
-    let simulated = critical(|stiffness| {
+    let simulated = critical_stiffness(SEARCH, SEARCH_WIDTH, |stiffness| {
         let settings = linear(stiffness);
         let set = contacts(&settings, &stops_about_z());
-        let plant = Plant::new(device, Hand::RELEASED, MinJerkPath::hold(Pose::identity()))
-            .with_motors(Motors {
-                delay: Duration::from_secs_f64(delay),
-                lag: Duration::ZERO,
-            })
-            .with_longest_step(PERIOD);
+        let plant = held(device, Hand::RELEASED, Pose::identity(), delay);
         let mut run = ClosedLoop::new(&world, &settings, set, plant);
         let turned = Pose::rotation(nalgebra::Vector3::z() * DISTURBANCE);
         run.plant.place(turned, Vector6::zeros());
@@ -165,7 +160,6 @@ fn about_z(delay: f64) -> (f64, f64) {
 #[must_use]
 pub fn run() -> Vec<Row> {
     let mut rows = Vec::new();
-    let period = PERIOD.as_secs_f64();
     let mut printed = 0.0_f64;
     for (damping, virtual_damping, table) in CRITICAL {
         for (delay, table) in DELAYS.into_iter().zip(table) {
@@ -173,8 +167,7 @@ pub fn run() -> Vec<Row> {
                 damping,
                 virtual_damping,
                 delay,
-                period,
-                hand: HandPreset::Released,
+                ..Case::STANDARD
             };
             printed = printed.max((case.by_eigenvalues() / table - 1.0).abs());
             rows.push(Row::within(
@@ -188,11 +181,9 @@ pub fn run() -> Vec<Row> {
     }
     for (delay, table) in CRITICAL_LIGHT {
         let case = Case {
-            damping: 1.0,
-            virtual_damping: 0.0,
             delay,
-            period,
             hand: HandPreset::Light,
+            ..Case::STANDARD
         };
         printed = printed.max((case.by_eigenvalues() / table - 1.0).abs());
         let name = format!("b 1, B 0, {} ms, light hand", delay * 1e3);
@@ -230,8 +221,8 @@ fn sweep() -> Row {
                     damping,
                     virtual_damping,
                     delay,
-                    period: PERIOD.as_secs_f64(),
                     hand,
+                    ..Case::STANDARD
                 };
                 let ratio = case.by_simulation() / case.by_eigenvalues();
                 worst = worst.max((ratio - 1.0).abs());

@@ -35,6 +35,15 @@ pub(super) const STANDARD: Conditions = Conditions {
     resolution: 0.0,
 };
 
+/// In a contact, with so many updates, Hz.
+pub(super) fn updated(contact: Contact, hz: f64) -> Conditions {
+    Conditions {
+        contact,
+        updates: hz as u32,
+        ..STANDARD
+    }
+}
+
 /// One map.
 #[derive(Clone, Copy, Debug)]
 pub struct Map {
@@ -65,60 +74,39 @@ pub const MAPS: [Map; 9] = [
         name: "rate",
         axis: "updates of the method, Hz (forces 1 kHz)",
         values: &RATES,
-        at: |hz| Conditions {
-            updates: hz as u32,
-            ..STANDARD
-        },
+        at: |hz| updated(Contact::Wall, hz),
     },
     Map {
         name: "corner",
         axis: "updates of the method in a corner of two walls, Hz",
         values: &RATES,
-        at: |hz| Conditions {
-            contact: Contact::Corner,
-            updates: hz as u32,
-            ..STANDARD
-        },
+        at: |hz| updated(Contact::Corner, hz),
     },
     Map {
         name: "turning",
         axis: "updates of the method in a hollow, where the contact turns, Hz",
         values: &RATES,
-        at: |hz| Conditions {
-            contact: Contact::Hollow,
-            updates: hz as u32,
-            ..STANDARD
-        },
+        at: |hz| updated(Contact::Hollow, hz),
     },
     Map {
         name: "turning-mesh",
         axis: "updates of the method, Hz, for a ball of 320 triangles in that hollow",
         values: &RATES,
-        at: |hz| Conditions {
-            contact: Contact::MeshInHollow,
-            updates: hz as u32,
-            ..STANDARD
-        },
+        at: |hz| updated(Contact::MeshInHollow, hz),
     },
     Map {
         name: "hole",
         axis: "updates of the method, Hz, for a peg in its hole",
         values: &RATES,
-        at: |hz| Conditions {
-            contact: Contact::PegInHole,
-            updates: hz as u32,
-            ..STANDARD
-        },
+        at: |hz| updated(Contact::PegInHole, hz),
     },
     Map {
         name: "way",
         axis: "share k_s of the way that an update covers, in a hollow at 300 Hz",
         values: &[0.25, 0.5, 0.75, 1.0],
         at: |k_s| Conditions {
-            contact: Contact::Hollow,
-            updates: 300,
             k_s: Some(k_s),
-            ..STANDARD
+            ..updated(Contact::Hollow, 300.0)
         },
     },
     Map {

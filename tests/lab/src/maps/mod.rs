@@ -20,14 +20,12 @@ mod axes;
 mod contact;
 mod files;
 
-use std::time::Duration;
-
 use god_object::spatial::{linear, six};
 use god_object::{Pose, Vector6};
 use nalgebra::Vector3;
-use taut_control_tests::closed_loop::{PERIOD, grip};
+use taut_control_tests::closed_loop::{PERIOD, critical_stiffness, grip, held};
 use taut_plant::stability::{SampledLoop, linear_limit, passive_limit_quantised};
-use taut_plant::{Encoder, Grip, Hand, MinJerkPath, Motors, Plant};
+use taut_plant::{Encoder, Grip, Hand, Plant};
 
 pub use axes::{Conditions, MAPS, Map};
 pub use contact::Contact;
@@ -116,16 +114,7 @@ impl Conditions {
 
     /// K_crit of a method, N/m.
     pub fn critical(&self, method: Method) -> f64 {
-        let [mut calm, mut wild] = SEARCH;
-        while wild / calm > 1.0 + SEARCH_WIDTH {
-            let middle = (calm * wild).sqrt();
-            if self.grows(method, middle) {
-                wild = middle;
-            } else {
-                calm = middle;
-            }
-        }
-        (calm * wild).sqrt()
+        critical_stiffness(SEARCH, SEARCH_WIDTH, |k| self.grows(method, k))
     }
 
     /// Whether the disturbance of a contact of this stiffness, N/m, grows.
@@ -184,12 +173,7 @@ impl Conditions {
 
     fn plant(&self, pressed: &Pressed) -> Plant {
         let at_rest = Pose::from(pressed.at_rest);
-        let mut plant = Plant::new(self.device(), Hand::RELEASED, MinJerkPath::hold(at_rest))
-            .with_motors(Motors {
-                delay: Duration::from_secs_f64(self.delay),
-                lag: Duration::ZERO,
-            })
-            .with_longest_step(PERIOD);
+        let mut plant = held(self.device(), Hand::RELEASED, at_rest, self.delay);
         if self.resolution > 0.0 {
             plant = plant.with_encoder(Encoder {
                 length: self.resolution,
@@ -238,7 +222,7 @@ pub(crate) fn tasks(extent: Extent) -> Vec<(Map, f64, Method)> {
 
 #[cfg(test)]
 mod tests {
-    use super::axes::STANDARD;
+    use super::axes::updated;
     use super::*;
 
     /// The method of this project is a spring to the wall: its limit is that of the eigenvalues.
@@ -265,14 +249,7 @@ mod tests {
 
     #[test]
     fn a_corner_is_as_stable_as_a_wall() {
-        let at = |contact| {
-            Conditions {
-                contact,
-                updates: 70,
-                ..STANDARD
-            }
-            .critical(Method::Ours)
-        };
+        let at = |contact| updated(contact, 70.0).critical(Method::Ours);
         let ratio = at(Contact::Corner) / at(Contact::Wall);
         assert!((0.95..1.05).contains(&ratio), "{ratio}");
     }
@@ -280,11 +257,7 @@ mod tests {
     /// In a hole the normal turns about the hole's axis, and the deepest point alone goes to and fro.
     #[test]
     fn a_peg_in_its_hole_bears_what_a_wall_does() {
-        let hole = Conditions {
-            contact: Contact::PegInHole,
-            updates: 300,
-            ..STANDARD
-        };
+        let hole = updated(Contact::PegInHole, 300.0);
         let spring = hole.by_eigenvalues();
         let [ours, penalty] = [Method::Ours, Method::Penalty].map(|method| hole.critical(method));
         assert!(ours > 0.95 * spring, "{ours} of {spring}");
@@ -295,10 +268,8 @@ mod tests {
     #[test]
     fn a_contact_that_turns_bears_more_the_farther_an_update_goes() {
         let at = |k_s| Conditions {
-            contact: Contact::Hollow,
-            updates: 300,
             k_s: Some(k_s),
-            ..STANDARD
+            ..updated(Contact::Hollow, 300.0)
         };
         let [half, whole] = [0.5, 1.0].map(|k_s| at(k_s).critical(Method::Paper));
         let spring = at(1.0).by_eigenvalues();
@@ -310,10 +281,8 @@ mod tests {
     fn a_contact_that_turns_bears_what_a_wall_does_however_slow_the_updates() {
         for k_s in [0.25, 1.0] {
             let slow = Conditions {
-                contact: Contact::Hollow,
-                updates: 70,
                 k_s: Some(k_s),
-                ..STANDARD
+                ..updated(Contact::Hollow, 70.0)
             };
             let (found, spring) = (slow.critical(Method::Ours), slow.by_eigenvalues());
             assert!((0.95..1.05).contains(&(found / spring)), "{k_s}: {found}");
@@ -323,11 +292,7 @@ mod tests {
     /// Of a ball of facets the rows are those of what its corners slide over, too: without them it bears less than half of that.
     #[test]
     fn a_mesh_that_turns_bears_what_a_wall_does_at_slow_updates() {
-        let slow = Conditions {
-            contact: Contact::MeshInHollow,
-            updates: 140,
-            ..STANDARD
-        };
+        let slow = updated(Contact::MeshInHollow, 140.0);
         let [ours, without] = [Method::Ours, Method::Discrete].map(|method| slow.critical(method));
         let spring = slow.by_eigenvalues();
         assert!(ours > 0.9 * spring, "{ours} of {spring}");
@@ -337,14 +302,8 @@ mod tests {
     /// A mass and a damper between hand and wall bear more than the device does, but not what turns at slow updates.
     #[test]
     fn slow_updates_cost_virtual_coupling_its_stability() {
-        let at = |updates| {
-            Conditions {
-                contact: Contact::Hollow,
-                updates,
-                ..STANDARD
-            }
-            .critical(Method::VirtualCoupling)
-        };
-        assert!(at(70) < at(1000), "{} {}", at(70), at(1000));
+        let [slow, fast] =
+            [70.0, 1000.0].map(|hz| updated(Contact::Hollow, hz).critical(Method::VirtualCoupling));
+        assert!(slow < fast, "{slow} {fast}");
     }
 }
