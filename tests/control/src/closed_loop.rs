@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use god_object::spatial::pose_difference;
 use god_object::{ConstraintSet, Coupling, Pose, Settings, Vector6, World};
 use nalgebra::Vector3;
 use taut_plant::{Grip, Hand, MinJerkPath, Motors, Plant};
@@ -68,7 +69,8 @@ impl ClosedLoop {
         let measured = self.plant.measured_pose();
         let answer = self.coupling.step(now.as_secs_f64(), &measured, &self.set);
         let last = self.last.replace(measured).unwrap_or(measured);
-        let velocity = difference(&measured, &last) / self.period.as_secs_f64();
+        let moved = pose_difference(&measured, &last, &Vector3::zeros());
+        let velocity = moved / self.period.as_secs_f64();
         let wrench = answer.wrench - self.virtual_damping.component_mul(&velocity);
         self.plant.command(&(wrench + self.push));
         Answer { measured, wrench }
@@ -100,9 +102,4 @@ pub fn critical_stiffness(
         }
     }
     (calm * wild).sqrt()
-}
-
-/// From one pose to a later one nearby: m and rad, world axes.
-pub fn difference(to: &Pose, from: &Pose) -> Vector6 {
-    god_object::spatial::pose_difference(to, from, &Vector3::zeros())
 }

@@ -13,14 +13,14 @@ use taut_plant::{Grip, Hand, MinJerkPath, ViaPoint};
 use crate::closed_loop::PERIOD;
 
 /// When things go wrong: the hand is fastest then.
-pub const FAULT_AT: Duration = Duration::from_millis(1000);
+pub(crate) const FAULT_AT: Duration = Duration::from_millis(1000);
 
 /// Stiffness of the wall z < 0, N/m.
 const STIFFNESS: f64 = 1000.0;
 
 /// How a device can fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Failure {
+pub(crate) enum Failure {
     /// It does not.
     None,
     /// One sample at the origin.
@@ -84,15 +84,15 @@ impl Device for FaultyDevice {
 }
 
 /// A hand that strokes a wall, and the port between.
-pub struct Stroke {
-    port: DevicePort,
+pub(crate) struct Stroke {
+    pub(crate) port: DevicePort,
     now: Duration,
     /// What was told, with its time since the begin.
-    pub events: Vec<(EventKind, Duration)>,
+    pub(crate) events: Vec<(EventKind, Duration)>,
     /// Norm of the force at each tick, N.
-    pub forces: Vec<f64>,
+    pub(crate) forces: Vec<f64>,
     /// Largest change of the force in one tick, N.
-    pub largest_step: f64,
+    pub(crate) largest_step: f64,
     last: Vector3<f64>,
 }
 
@@ -101,7 +101,7 @@ impl Stroke {
     const BEGIN: Duration = Duration::from_secs(10);
 
     /// The hand goes along x at 10 mm in the wall, 0.3 m in 1.6 s, fastest at [`FAULT_AT`].
-    pub fn new(failure: Failure, settings: SafetySettings, buttons: u16) -> Self {
+    pub(crate) fn new(failure: Failure, settings: SafetySettings, buttons: u16) -> Self {
         let via = |time_s, x| ViaPoint {
             time_s,
             pose: Pose::translation(x, 0.1, -0.01),
@@ -129,18 +129,13 @@ impl Stroke {
         }
     }
 
-    /// The port.
-    pub fn port(&mut self) -> &mut DevicePort {
-        &mut self.port
-    }
-
     /// Time since the begin.
-    pub fn passed(&self) -> Duration {
+    fn passed(&self) -> Duration {
         self.now - Self::BEGIN
     }
 
     /// One period: the wall's force is computed from the newest sample that may be trusted.
-    pub fn tick(&mut self) -> TickReport {
+    pub(crate) fn tick(&mut self) -> TickReport {
         let now = self.now;
         let report = self.port.tick(now, |reading| {
             let depth = (-reading.sample.pose.translation.z).max(0.0);
@@ -158,15 +153,14 @@ impl Stroke {
     }
 
     /// Ticks until `passed` since the begin.
-    pub fn run_until(&mut self, passed: Duration) {
+    pub(crate) fn run_until(&mut self, passed: Duration) {
         while self.passed() < passed {
             let _ = self.tick();
         }
     }
 
     /// Whether something was told.
-    #[must_use]
-    pub fn has_event(&self, kind: EventKind) -> bool {
+    pub(crate) fn has_event(&self, kind: EventKind) -> bool {
         self.events.iter().any(|(event, _)| *event == kind)
     }
 }

@@ -3,10 +3,9 @@
 //! Each recipe is a function that runs and says what it measured against what is expected, as rows; [`RECIPES`] lists them. The
 //! tests of this package run every one; `cargo run --release -p taut-control-tests` prints the table.
 //!
-//! - [`row`]: what a recipe says.
 //! - [`walls`]: constraint sets made by hand, and a body to hold against them.
 //! - [`closed_loop`]: coupling, device and hand, tick by tick.
-//! - [`faulty_device`]: a device that fails on cue, behind its port.
+//! - `faulty_device`: a device that fails on cue, behind its port.
 //! - [`recipes`]: the recipes.
 //! - [`edge`]: coupling beside the device against shipping forces; its chart is the example `edge_coupling`.
 //! - [`delay`]: a whole session behind a network whose delay grows.
@@ -17,9 +16,9 @@ pub mod edge;
 pub mod edge_error;
 pub mod edge_network;
 pub mod edge_scenes;
-pub mod faulty_device;
+mod faulty_device;
 pub mod recipes;
-pub mod row;
+mod row;
 pub mod walls;
 
 pub use row::Row;

@@ -57,14 +57,13 @@ fn settings(dead_man: Option<u8>) -> SafetySettings {
 fn armed(failure: Failure, settings: SafetySettings) -> Stroke {
     let mut stroke = Stroke::new(failure, settings, 0);
     let _ = stroke.tick();
-    stroke.port().ask_to_arm();
+    stroke.port.ask_to_arm();
     stroke.run_until(FAULT_AT);
     stroke
 }
 
 /// Every case, and what a person does about it.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let mut all = Vec::new();
     for (name, failure, kind) in CASES {
         let mut rows = Rows::of(name);
@@ -87,7 +86,7 @@ pub fn run() -> Vec<Row> {
         let kinds: Vec<_> = stroke.events.iter().map(|(kind, _)| *kind).collect();
         let expected = format!("{kind:?}, RearmNeeded");
         rows.holds("told", format!("{kinds:?}"), expected, events);
-        stroke.port().ask_to_arm();
+        stroke.port.ask_to_arm();
         stroke.run_until(Duration::from_millis(3500));
         let again = stroke.forces.last().copied().unwrap_or(0.0);
         // Time stamps that stay behind are no good samples: nobody can arm that.

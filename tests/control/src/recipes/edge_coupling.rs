@@ -15,8 +15,7 @@ const NOTICED: f64 = 1.0;
 const MORE_ENERGY: f64 = 10.0;
 
 /// Every task both ways.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let network = Impairment::new(DELAY, LOSS);
     let stability = |stable| if stable { "stable" } else { "unstable" };
     let mut all = Vec::new();

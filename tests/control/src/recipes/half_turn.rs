@@ -55,8 +55,7 @@ fn torques(axis_turn: f64) -> (Vec<(f64, f64)>, f64, f64) {
 }
 
 /// Both ways round.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let mut all = Vec::new();
     for (name, sense) in [("200 deg and back", 1.0), ("-200 deg and back", -1.0)] {
         let mut rows = Rows::of(name);

@@ -43,11 +43,7 @@ const EXPECTED: [(f64, f64, f64); 4] = [
 ];
 
 /// Force from peak to peak, N, over the ticks that are watched, one pair after the other.
-pub fn peak_to_peak<const N: usize>(
-    stiffness: f64,
-    coulomb: f64,
-    watched: [[u32; 2]; N],
-) -> [f64; N] {
+fn peak_to_peak<const N: usize>(stiffness: f64, coulomb: f64, watched: [[u32; 2]; N]) -> [f64; N] {
     let settings = linear(stiffness);
     let set = contacts(&settings, &above_x());
     let device = Grip {
@@ -81,8 +77,7 @@ pub fn peak_to_peak<const N: usize>(
 }
 
 /// The expected cycles, and none below the limit of passivity.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let mut rows = Vec::new();
     for (stiffness, without, with) in EXPECTED {
         let count = stiffness * RESOLUTION;

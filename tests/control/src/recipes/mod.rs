@@ -1,13 +1,13 @@
 //! The recipes, one file each.
 
-pub mod bad_samples;
-pub mod edge_coupling;
-pub mod half_turn;
-pub mod limit_cycles;
-pub mod passivity;
-pub mod release;
-pub mod saturation;
-pub mod stalls;
-pub mod string_faults;
+pub(crate) mod bad_samples;
+pub(crate) mod edge_coupling;
+pub(crate) mod half_turn;
+pub(crate) mod limit_cycles;
+pub(crate) mod passivity;
+pub(crate) mod release;
+pub(crate) mod saturation;
+pub(crate) mod stalls;
+pub(crate) mod string_faults;
 pub mod wall_stability;
-pub mod wind_up;
+pub(crate) mod wind_up;

@@ -62,8 +62,7 @@ fn kick(stiffness: f64, mode: Passivity) -> Seen {
 }
 
 /// Below and above the critical stiffness.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let mut rows = Vec::new();
     for stiffness in [3000.0, 4000.0] {
         let observed = kick(stiffness, Passivity::Observe);

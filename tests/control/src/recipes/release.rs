@@ -145,8 +145,7 @@ fn let_go(settings: &Settings) -> Seen {
 }
 
 /// One release.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let settings = Settings {
         damping_time: DAMPING_TIME,
         ..Settings::for_size(2.0 * PEG.1)

@@ -67,8 +67,7 @@ fn port(speed: f64) -> DevicePort {
 }
 
 /// Direction, norms, and contact.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let mut all = saturated();
     let told = |acts| if acts { "acts" } else { "does not act" };
     // R11's speeds, and one between: up to 1 N/ms.

@@ -85,8 +85,7 @@ impl Device for StalledDevice {
 }
 
 /// Every loop, every length.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let mut rows = Vec::new();
     for stalled in [Stalled::GodObject, Stalled::Coupling, Stalled::Haptics] {
         for milliseconds in LENGTHS {

@@ -21,8 +21,7 @@ const SLIPS: (u32, u32) = (1000, 1100);
 const DIRECTION: f64 = 1e-3;
 
 /// Every fault on every geometry.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let mut all = Vec::new();
     for geometry in Geometry::shipped_names().filter_map(Geometry::shipped) {
         let mut rows = Rows::of(&geometry.name);

@@ -157,8 +157,7 @@ fn about_z(delay: f64) -> (f64, f64) {
 }
 
 /// The printed table, the light hand's, every hand, and the rotation.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let mut rows = Vec::new();
     let mut printed = 0.0_f64;
     for (damping, virtual_damping, table) in CRITICAL {

@@ -130,8 +130,7 @@ fn lead(whole_turn: f64) -> (Seen, f64) {
 }
 
 /// Wound up, let go, at rest.
-#[must_use]
-pub fn run() -> Vec<Row> {
+pub(crate) fn run() -> Vec<Row> {
     let play = 2.0 * CLEARANCE / BAR[0];
     let mut all = Vec::new();
     for turn in TURNS {
