@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::process::Command;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Versions of all crates of this build.
 const LOCK: &str = include_str!("../../../Cargo.lock");
@@ -14,7 +13,6 @@ const CRATES: [&str; 5] = [
     "clarabel",
     "plotters",
 ];
-const SECONDS_A_DAY: u64 = 86_400;
 
 /// The model of the first processor, as Linux names it.
 pub fn processor() -> String {
@@ -42,7 +40,10 @@ pub fn all() -> Vec<(&'static str, String)> {
         ("build", build.to_owned()),
         ("crates", CRATES.map(version).join(", ")),
         ("commit", commit()),
-        ("date", date(SystemTime::now())),
+        (
+            "date",
+            answer(Command::new("date").args(["-u", "+%Y-%m-%d %H:%M UTC"])),
+        ),
         ("command", command()),
     ]
 }
@@ -75,11 +76,14 @@ fn version(name: &str) -> String {
 
 /// Of the sources that the command stands in.
 pub(crate) fn commit() -> String {
-    let asked = Command::new("git")
-        .args(["-C", env!("CARGO_MANIFEST_DIR")])
-        .args(["describe", "--always", "--dirty", "--abbrev=12"])
-        .output();
-    match asked {
+    let git = &mut Command::new("git");
+    let git = git.args(["-C", env!("CARGO_MANIFEST_DIR")]);
+    answer(git.args(["describe", "--always", "--dirty", "--abbrev=12"]))
+}
+
+/// What a program prints.
+fn answer(asked: &mut Command) -> String {
+    match asked.output() {
         Ok(answer) if answer.status.success() => {
             String::from_utf8_lossy(&answer.stdout).trim().to_owned()
         }
@@ -93,44 +97,9 @@ fn command() -> String {
     format!("taut-lab {}", arguments.join(" "))
 }
 
-/// Day and time in UTC. Source: Gregorian calendar, years counted from March.
-fn date(now: SystemTime) -> String {
-    let seconds = now.duration_since(UNIX_EPOCH).map_or(0, |s| s.as_secs());
-    let days = seconds / SECONDS_A_DAY + 719_468; // since 1 March of the year 0
-    let era = days / 146_097;
-    let day = days % 146_097;
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let day = day - (153 * month + 2) / 5 + 1;
-    let (month, next) = if month < 10 {
-        (month + 3, 0)
-    } else {
-        (month - 9, 1)
-    };
-    let minutes = seconds % SECONDS_A_DAY / 60;
-    format!(
-        "{}-{month:02}-{day:02} {:02}:{:02} UTC",
-        era * 400 + year + next,
-        minutes / 60,
-        minutes % 60
-    )
-}
-
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
-
-    #[test]
-    fn days_are_those_of_the_calendar() {
-        let at = |seconds| date(UNIX_EPOCH + Duration::from_secs(seconds));
-        assert_eq!(at(0), "1970-01-01 00:00 UTC");
-        assert_eq!(at(951_782_399), "2000-02-28 23:59 UTC");
-        assert_eq!(at(951_782_400), "2000-02-29 00:00 UTC");
-        assert_eq!(at(1_767_225_600), "2026-01-01 00:00 UTC");
-    }
 
     #[test]
     fn versions_are_those_of_the_lock() {

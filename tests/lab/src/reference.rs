@@ -9,7 +9,6 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use god_object::spatial::{angular, linear};
 use god_object::{Coupling, GodObject, Settings, Vector6};
@@ -17,6 +16,7 @@ use god_object::{Coupling, GodObject, Settings, Vector6};
 use crate::clock::TICK;
 use crate::cpu_time::quantile;
 use crate::recipe::Recipe;
+use crate::store;
 
 /// Steps a tick, each twice the last.
 const STEPS: [u32; 4] = [5, 10, 20, 40];
@@ -30,8 +30,6 @@ const NEARER: f64 = 0.1;
 const SUBSTEPS: u32 = 50;
 /// Rounds of implicit constraints.
 const ROUNDS: u32 = 3;
-/// Files begun by this process.
-static PARTS: AtomicUsize = AtomicUsize::new(0);
 /// First bytes of a cached answer; another layout gets another.
 const MAGIC: [u8; 8] = *b"tautref1";
 
@@ -116,15 +114,7 @@ pub(crate) fn of(recipe: &Recipe) -> Answer {
         .and_then(|bytes| Answer::from_bytes(&bytes, recipe.ticks() as usize));
     cached.unwrap_or_else(|| {
         let answer = converge(recipe);
-        // Renamed when it is whole: tests run side by side. A cache that cannot be written costs time and nothing else.
-        let turn = PARTS.fetch_add(1, Ordering::Relaxed);
-        let part = file.with_extension(format!("{}-{turn}.part", std::process::id()));
-        let written = fs::create_dir_all(directory())
-            .and_then(|()| fs::write(&part, answer.to_bytes()))
-            .and_then(|()| fs::rename(&part, &file));
-        if let Err(error) = written {
-            eprintln!("{}: not cached: {error}", file.display());
-        }
+        store::keep(&file, &answer.to_bytes());
         answer
     })
 }

@@ -63,17 +63,21 @@ impl Store {
             return result;
         }
         let (result, numbers) = make();
-        // Renamed when it is whole. A folder that cannot be written costs time and nothing else.
-        // Two threads may have made the same: each writes a part of its own.
-        let turn = PARTS.fetch_add(1, Ordering::Relaxed);
-        let part = file.with_extension(format!("{}-{turn}.part", std::process::id()));
-        let written = fs::create_dir_all(directory)
-            .and_then(|()| fs::write(&part, bytes(&numbers)))
-            .and_then(|()| fs::rename(&part, &file));
-        if let Err(error) = written {
-            eprintln!("{}: not kept: {error}", file.display());
-        }
+        keep(&file, &bytes(&numbers));
         result
+    }
+}
+
+/// Writes a file that is renamed when it is whole. A folder that cannot be written costs time and nothing else.
+pub(crate) fn keep(file: &Path, bytes: &[u8]) {
+    // Two threads, or tests side by side, may have made the same: each writes a part of its own.
+    let turn = PARTS.fetch_add(1, Ordering::Relaxed);
+    let part = file.with_extension(format!("{}-{turn}.part", std::process::id()));
+    let written = fs::create_dir_all(file.parent().unwrap_or(Path::new(".")))
+        .and_then(|()| fs::write(&part, bytes))
+        .and_then(|()| fs::rename(&part, file));
+    if let Err(error) = written {
+        eprintln!("{}: not kept: {error}", file.display());
     }
 }
 
