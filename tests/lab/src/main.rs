@@ -39,47 +39,40 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<ExitCode, Box<dyn Error>> {
-    if std::env::args()
-        .skip(1)
-        .any(|argument| argument == "--help")
-    {
+    let all: Vec<String> = std::env::args().skip(1).collect();
+    if all.iter().any(|argument| argument == "--help") {
         print!("{}", help());
         return Ok(ExitCode::SUCCESS);
     }
-    if std::env::args().nth(1).as_deref() == Some("fidelity") {
-        return taut_lab::fidelity::command::run(std::env::args().skip(2));
+    let mut given = all.iter().skip(1).cloned();
+    match all.first().map(String::as_str) {
+        Some("fidelity") => taut_lab::fidelity::command::run(given),
+        Some("--measure") => measure(given),
+        Some("papers") => {
+            print!("{}", papers::table(&papers::figures()));
+            Ok(ExitCode::SUCCESS)
+        }
+        Some("league") => {
+            let directory = given.next().unwrap_or(DIRECTORY.to_owned());
+            taut_lab::page::league::write(Path::new(&directory))?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Some("oracle") => taut_lab::oracle::command(&all[1..]),
+        Some("measured") => measured(given.next()),
+        _ => laboratory(arguments(all.into_iter())?),
     }
-    if std::env::args().nth(1).as_deref() == Some("--measure") {
-        return measure(std::env::args().skip(2));
-    }
-    if std::env::args().nth(1).as_deref() == Some("papers") {
-        print!("{}", papers::table(&papers::figures()));
-        return Ok(ExitCode::SUCCESS);
-    }
-    if std::env::args().nth(1).as_deref() == Some("league") {
-        let directory = std::env::args().nth(2);
-        taut_lab::page::league::write(Path::new(directory.as_deref().unwrap_or(DIRECTORY)))?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    if std::env::args().nth(1).as_deref() == Some("oracle") {
-        let names: Vec<String> = std::env::args().skip(2).collect();
-        return taut_lab::oracle::command(&names);
-    }
-    if std::env::args().nth(1).as_deref() == Some("measured") {
-        return measured(std::env::args().nth(2));
-    }
+}
+
+/// Runs a plan, and writes and prints what came of it.
+fn laboratory(given: Arguments) -> Result<ExitCode, Box<dyn Error>> {
     let Arguments {
         plan,
         directory,
         page,
         fresh,
-    } = arguments(std::env::args().skip(1))?;
+    } = given;
     plan.validate()?;
-    let store = if fresh {
-        Store::none()
-    } else {
-        Store::in_directory(&directory.join("done"))
-    };
+    let store = store(fresh, &directory);
     let results = plan.run(&store);
     results.write(&directory, page)?;
     print!("{}", report::headlines(&results.scores));
@@ -92,10 +85,19 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
     Ok(ExitCode::from(u8::from(failed)))
 }
 
+/// Finished results beside the files; none where everything is to run again.
+fn store(fresh: bool, directory: &Path) -> Store {
+    if fresh {
+        Store::none()
+    } else {
+        Store::in_directory(&directory.join("done"))
+    }
+}
+
 /// Replays every measured trial through every method that turns its body, and writes the figures.
 fn measured(path: Option<String>) -> Result<ExitCode, Box<dyn Error>> {
     let path = path.map_or_else(
-        || PathBuf::from(DIRECTORY).join("measured-forces.csv"),
+        || Path::new(DIRECTORY).join("measured-forces.csv"),
         PathBuf::from,
     );
     let mut all = Vec::new();
@@ -130,11 +132,7 @@ fn measure(mut given: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn 
     if methods.is_empty() {
         methods.extend(Method::ALL);
     }
-    let store = if fresh {
-        Store::none()
-    } else {
-        Store::in_directory(&Path::new(DIRECTORY).join("done"))
-    };
+    let store = store(fresh, Path::new(DIRECTORY));
     let old = std::fs::read_to_string(&path).unwrap_or_default();
     let table = taut_lab::costs::measure(&methods, &old, &store, |done, total| {
         eprintln!("{done} of {total} recipes");
