@@ -188,7 +188,7 @@ fn sweeps_name_recipes_that_are_there_and_settings_that_are_valid() {
             let recipe = recipe.unwrap_or_else(|| panic!("{}: no {name}, {case}", sweep.name));
             for variant in variants() {
                 let fitted = recipe.scene.fitted(1.0 / f64::from(variant.rate));
-                let settings = (variant.settings)(fitted, variant.value);
+                let settings = (variant.settings)(fitted);
                 assert_eq!(
                     settings.validate(),
                     Ok(()),

@@ -38,16 +38,13 @@ pub const SWEEPS: [Sweep; 10] = [
 ];
 
 /// What a sweep varies.
-#[derive(Clone, Debug)]
 pub struct Variant {
     /// What it is called in files and legends.
     pub label: String,
     /// Updates a second, Hz.
     pub rate: u32,
     /// Settings from those of the recipe.
-    pub settings: fn(Settings, f64) -> Settings,
-    /// The number that `settings` takes.
-    pub value: f64,
+    pub settings: Box<dyn Fn(Settings) -> Settings + Sync>,
 }
 
 /// A run of a recipe that a sweep has made for itself.
@@ -203,7 +200,7 @@ impl Sweep {
                     .collect();
                 crew::map(threads, &tasks, |(recipe, variant)| {
                     let fitted = recipe.scene.fitted(1.0 / f64::from(variant.rate));
-                    let settings = (variant.settings)(fitted, variant.value);
+                    let settings = (variant.settings)(fitted);
                     point(recipe, &variant.label, variant.rate, None, &settings)
                 })
             }

@@ -24,14 +24,12 @@ const fn sweep(
 fn variant(
     label: String,
     rate: u32,
-    value: f64,
-    settings: fn(Settings, f64) -> Settings,
+    settings: impl Fn(Settings) -> Settings + Sync + 'static,
 ) -> Variant {
     Variant {
         label,
         rate,
-        settings,
-        value,
+        settings: Box::new(settings),
     }
 }
 
@@ -46,7 +44,11 @@ pub(super) const SHARE: Sweep = sweep(
         ("R12", "radius 20 mm, 0.2 m/s"),
     ],
     || {
-        let of = |share| variant(format!("k_s {share}"), 1000, share, with_share);
+        let of = |share| {
+            variant(format!("k_s {share}"), 1000, move |given| {
+                with_share(given, share)
+            })
+        };
         [0.1, 0.25, 0.5, 0.75, 1.0].map(of).into()
     },
 );
@@ -62,17 +64,15 @@ pub(super) const CCD_TOLERANCE: Sweep = sweep(
         ("R18", "in the hole, clearance 0.5 mm"),
     ],
     || {
-        let of = |gaps| variant(format!("{gaps} gaps"), 1000, gaps, with_tolerance);
+        let of = |gaps| {
+            variant(format!("{gaps} gaps"), 1000, move |given| Settings {
+                gap_tolerance: gaps * given.minimum_gap,
+                ..given
+            })
+        };
         [0.001, 0.01, 0.1, 1.0, 8.0].map(of).into()
     },
 );
-
-fn with_tolerance(given: Settings, gaps: f64) -> Settings {
-    Settings {
-        gap_tolerance: gaps * given.minimum_gap,
-        ..given
-    }
-}
 
 /// Updates a second; forces are made every millisecond all the same.
 pub(super) const RATE: Sweep = sweep(
@@ -85,11 +85,7 @@ pub(super) const RATE: Sweep = sweep(
         ("R12", "radius 20 mm, 0.2 m/s"),
     ],
     || {
-        let of = |rate| {
-            variant(format!("{rate} Hz"), rate, f64::from(rate), |given, _| {
-                given
-            })
-        };
+        let of = |rate| variant(format!("{rate} Hz"), rate, |given| given);
         [70, 150, 300, 500, 1000].map(of).into()
     },
 );
@@ -105,24 +101,16 @@ pub(super) const ROUNDS: Sweep = sweep(
         ("R19", "pulled out askew"),
     ],
     || {
-        let of = |rounds: u32| {
-            variant(
-                format!("{rounds} rounds"),
-                1000,
-                f64::from(rounds),
-                with_rounds,
-            )
+        let of = |implicit_rounds| {
+            let label = format!("{implicit_rounds} rounds");
+            variant(label, 1000, move |given| Settings {
+                implicit_rounds,
+                ..given
+            })
         };
         (0..=3).map(of).collect()
     },
 );
-
-fn with_rounds(given: Settings, rounds: f64) -> Settings {
-    Settings {
-        implicit_rounds: rounds as u32,
-        ..given
-    }
-}
 
 /// Constraints published before contact, or when they touch as the paper has them, at three rates.
 pub(super) const LOOK_AHEAD: Sweep = sweep(
@@ -130,11 +118,18 @@ pub(super) const LOOK_AHEAD: Sweep = sweep(
     "contacts published before they touch or not until then, by rate",
     &WITHOUT_LOOK_AHEAD,
     || {
-        let both = [("on", 1.0), ("off", 0.0)].into_iter();
-        both.flat_map(|(label, on)| {
-            RATES.map(|rate| variant(format!("{label}, {rate} Hz"), rate, on, with_look_ahead))
-        })
-        .collect()
+        let of = |(label, look_ahead)| {
+            RATES.map(|rate| {
+                variant(format!("{label}, {rate} Hz"), rate, move |given| Settings {
+                    look_ahead,
+                    ..given
+                })
+            })
+        };
+        [("on", true), ("off", false)]
+            .into_iter()
+            .flat_map(of)
+            .collect()
     },
 );
 
@@ -146,35 +141,29 @@ const WITHOUT_LOOK_AHEAD: [(&str, &str); 4] = [
     ("R11", "0.3 m/s"),
 ];
 
-fn with_look_ahead(given: Settings, on: f64) -> Settings {
-    Settings {
-        look_ahead: on > 0.0,
-        ..given
-    }
-}
-
 /// How long a constraint that is violated when it appears takes to enter; without look-ahead, where such constraints are common.
 pub(super) const ADAPTATION: Sweep = sweep(
     "adaptation",
     "time over which a violated new constraint enters, without look-ahead, at 300 Hz",
     &WITHOUT_LOOK_AHEAD,
     || {
-        let label = |ms: f64| match ms > 0.0 {
-            true => format!("{ms} ms"),
-            false => "off".into(),
+        let of = |ms: f64| {
+            let label = match ms > 0.0 {
+                true => format!("{ms} ms"),
+                false => "off".into(),
+            };
+            let duration = ms * 1e-3;
+            variant(label, 300, move |given| {
+                let adaptation = given
+                    .adaptation
+                    .map(|given| Adaptation { duration, ..given });
+                Settings {
+                    look_ahead: false,
+                    adaptation: adaptation.filter(|_| duration > 0.0),
+                    ..given
+                }
+            })
         };
-        let of = |ms: f64| variant(label(ms), 300, ms * 1e-3, with_duration);
         [0.0, 10.0, 20.0, 100.0].map(of).into()
     },
 );
-
-fn with_duration(given: Settings, duration: f64) -> Settings {
-    let adaptation = given
-        .adaptation
-        .map(|given| Adaptation { duration, ..given });
-    Settings {
-        look_ahead: false,
-        adaptation: adaptation.filter(|_| duration > 0.0),
-        ..given
-    }
-}

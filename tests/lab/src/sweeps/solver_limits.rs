@@ -24,44 +24,33 @@ const ALL: u32 = 10_000;
 const FINEST: f64 = 1e-13;
 
 fn run(extent: Extent, threads: usize) -> Vec<Point> {
+    let by_tolerance = TOLERANCES.map(|tolerance| {
+        let value = format!("{tolerance:e}");
+        ("by tolerance", value, tolerance, ALL)
+    });
+    let by_cap = CAPS.map(|cap| ("by cap of iterations", cap.to_string(), FINEST, cap));
+    let limits: Vec<_> = by_tolerance.into_iter().chain(by_cap).collect();
     let mut tasks = Vec::new();
     for count in COUNTS {
         for (kind, name) in SolverName::ALL {
-            let by_tolerance = TOLERANCES.map(|tolerance| (tolerance, ALL));
-            let by_cap = CAPS.map(|cap| (FINEST, cap));
-            for (index, (tolerance, cap)) in by_tolerance.into_iter().chain(by_cap).enumerate() {
-                let case = if index < TOLERANCES.len() {
-                    format!("{count} contacts, by tolerance")
-                } else {
-                    format!("{count} contacts, by cap of iterations")
-                };
-                let value = if index < TOLERANCES.len() {
-                    format!("{tolerance:e}")
-                } else {
-                    cap.to_string()
-                };
-                let limits = SolverLimits {
-                    tolerance,
-                    max_iterations: cap,
-                };
-                tasks.push((count, kind, name, case, value, limits));
-            }
+            tasks.extend(limits.iter().map(|limits| (count, kind, name, limits)));
         }
     }
-    crew::map(
-        threads,
-        &tasks,
-        |(count, kind, name, case, value, limits)| {
-            let (error, p99_us) = random_contacts(extent, *count, *kind, *limits);
-            Point {
-                recipe: "R38",
-                case: case.clone(),
-                setting: format!("{name} {value}"),
-                rate: None,
-                error,
-                cost: p99_us,
-                measures: Vec::new(),
-            }
-        },
-    )
+    crew::map(threads, &tasks, |(count, kind, name, limits)| {
+        let (by, value, tolerance, max_iterations) = limits;
+        let limits = SolverLimits {
+            tolerance: *tolerance,
+            max_iterations: *max_iterations,
+        };
+        let (error, p99_us) = random_contacts(extent, *count, *kind, limits);
+        Point {
+            recipe: "R38",
+            case: format!("{count} contacts, {by}"),
+            setting: format!("{name} {value}"),
+            rate: None,
+            error,
+            cost: p99_us,
+            measures: Vec::new(),
+        }
+    })
 }
