@@ -61,13 +61,14 @@ pub(crate) fn colour(method: Method) -> RGBColor {
 
 /// A point: share of one core that the method takes, and J.
 fn point(outcome: &Outcome) -> (f64, f64) {
-    (outcome.load.core, outcome.worst(Measure::JndP95))
+    (outcome.measured.load.core, outcome.worst(Measure::JndP95))
 }
 
 /// Least and largest J over the start phases.
 fn band(outcome: &Outcome) -> [f64; 2] {
     let felt = || {
         outcome
+            .measured
             .phases
             .iter()
             .map(|phase| phase.get(Measure::JndP95))
@@ -221,7 +222,7 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
         for outcome in of_panel {
             let (share, felt) = point(outcome);
             let on_front = front.contains(&(share, felt));
-            let held = outcome.load.held;
+            let held = outcome.measured.load.held;
             let keys = keys(outcome);
             writeln!(
                 csv,

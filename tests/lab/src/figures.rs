@@ -257,7 +257,7 @@ fn costs_beside(scores: &[Score], outcomes: &[Outcome]) -> String {
                     (o.method, o.rate) == (Method::OursByDefault, rate)
                         && case_of(o) == case_of(other)
                 });
-                ours.map(|ours| ours.load.core / other.load.core)
+                ours.map(|ours| ours.measured.load.core / other.measured.load.core)
             };
             let ratios: Vec<f64> = outcomes.iter().filter(good).filter_map(ratio).collect();
             if ratios.is_empty() {

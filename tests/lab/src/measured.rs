@@ -35,15 +35,6 @@ pub struct Load {
     pub core: f64,
 }
 
-/// Whose costs are charged.
-#[derive(Clone, Copy, Debug)]
-pub struct Payer {
-    /// Who runs.
-    pub method: Method,
-    /// With what.
-    pub tuning: Tuning,
-}
-
 /// Measures and times.
 #[derive(Clone, Debug)]
 pub struct Measured {
@@ -56,21 +47,20 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Runs a recipe at a rate, Hz, from start phases, each with a method that `start` gives. Without a `payer`, or where its costs
-    /// are not known, every update takes its whole period.
+    /// Runs a recipe at a rate, Hz, from start phases, each with a method that `start` gives. `payer` is whose costs are charged; without
+    /// one, or where its costs are not known, every update takes its whole period.
     pub fn of(
         recipe: &Recipe,
         rate: u32,
         phases: &[f64],
-        payer: Option<Payer>,
+        payer: Option<(Method, Tuning)>,
         start: impl Fn() -> Box<dyn HapticMethod>,
     ) -> Self {
         let (mut updates, mut forces) = (Vec::new(), Vec::new());
-        let cost = payer.and_then(|by| costs::of(recipe, by.method, by.tuning, rate));
+        let cost = payer.and_then(|(by, with)| costs::of(recipe, by, with, rate));
         let charge = |phase: f64| match (payer, cost) {
-            (Some(by), Some(cost)) => {
-                let seed = costs::seed(recipe, by.method, by.tuning, rate, phase);
-                Charge::Drawn(cost, seed)
+            (Some((by, with)), Some(cost)) => {
+                Charge::Drawn(cost, costs::seed(recipe, by, with, rate, phase))
             }
             _ => Charge::WholePeriod,
         };
@@ -103,10 +93,12 @@ impl Measured {
     }
 
     /// Times, number of probes, then measures and probes phase by phase.
-    pub(crate) fn to_numbers(phases: &[Measures], times: &Times, load: &Load) -> Vec<f64> {
+    pub(crate) fn to_numbers(&self) -> Vec<f64> {
+        let (times, load) = (self.times, self.load);
         let mut numbers = [times.update, times.force, [load.held, load.core]].concat();
-        numbers.push(phases.first().map_or(0, |phase| phase.probes.len()) as f64);
-        for phase in phases {
+        let probes = self.phases.first().map_or(0, |phase| phase.probes.len());
+        numbers.push(probes as f64);
+        for phase in &self.phases {
             numbers.extend(phase.values().iter().chain(&phase.probes));
         }
         numbers

@@ -1,8 +1,8 @@
 //! A recipe run for one method at one rate, over all start phases, against its pass lines.
 
 use crate::clock::RATES;
-use crate::measure::{Measure, Measures};
-use crate::measured::{Load, Measured, Payer, TRAINING, Times, judged, largest};
+use crate::measure::Measure;
+use crate::measured::{Measured, TRAINING, judged, largest};
 use crate::method::{Method, Tuning};
 use crate::recipe::{Ideal, Line, Recipe};
 use crate::reference::{FORCE_ERROR, TORQUE_ERROR};
@@ -22,16 +22,12 @@ pub struct Outcome {
     pub rate: u32,
     /// With what.
     pub tuning: Tuning,
-    /// One for each start phase.
-    pub phases: Vec<Measures>,
+    /// From each start phase.
+    pub measured: Measured,
     /// What passes, and whether it did.
     pub lines: Vec<(Line, bool)>,
     /// What each tuning came to that was tried; empty where there was no choice.
     pub trials: Vec<Trial>,
-    /// CPU times of the thread.
-    pub times: Times,
-    /// On the virtual clock.
-    pub load: Load,
 }
 
 /// A tuning that was tried, from the phases for [`TRAINING`].
@@ -87,8 +83,7 @@ impl Outcome {
     ) -> Self {
         let period = 1.0 / f64::from(rate);
         let start = || method.start(&recipe.scene, period, tuning);
-        let payer = Some(Payer { method, tuning });
-        let measured = Measured::of(recipe, rate, phases, payer, start);
+        let measured = Measured::of(recipe, rate, phases, Some((method, tuning)), start);
         Self::judged(recipe, method, rate, tuning, measured)
     }
 
@@ -100,24 +95,21 @@ impl Outcome {
         tuning: Tuning,
         measured: Measured,
     ) -> Self {
-        let mut outcome = Self {
+        let judged = |line: Line| {
+            let passes = measured.worst(line.measure) <= line.limit; // false for NaN
+            (line, passes)
+        };
+        let lines = (recipe.lines)(rate).into_iter().chain(recipe.felt_lines());
+        Self {
             recipe: recipe.name,
             case: recipe.case.clone(),
             method,
             rate,
             tuning,
-            phases: measured.phases,
-            lines: Vec::new(),
+            lines: lines.map(judged).collect(),
+            measured,
             trials: Vec::new(),
-            times: measured.times,
-            load: measured.load,
-        };
-        let common = recipe.felt_lines();
-        for line in (recipe.lines)(rate).into_iter().chain(common) {
-            let passes = outcome.worst(line.measure) <= line.limit; // false for NaN
-            outcome.lines.push((line, passes));
         }
-        outcome
     }
 
     /// [`Outcome::of`], or what it came to before, where `store` has it.
@@ -149,7 +141,7 @@ impl Outcome {
         for trial in &self.trials {
             numbers.extend([index(trial.tuning), trial.missed as f64, trial.felt]);
         }
-        numbers.extend(Measured::to_numbers(&self.phases, &self.times, &self.load));
+        numbers.extend(self.measured.to_numbers());
         numbers
     }
 
@@ -176,18 +168,19 @@ impl Outcome {
 
     /// The largest value over the phases; NaN where one is.
     pub fn worst(&self, measure: Measure) -> f64 {
-        largest(self.phases.iter().map(|phase| phase.get(measure)))
+        self.measured.worst(measure)
     }
 
     /// The mean over the phases.
     pub fn mean(&self, measure: Measure) -> f64 {
-        let sum: f64 = self.phases.iter().map(|phase| phase.get(measure)).sum();
-        sum / self.phases.len() as f64
+        let phases = &self.measured.phases;
+        let sum: f64 = phases.iter().map(|phase| phase.get(measure)).sum();
+        sum / phases.len() as f64
     }
 
     /// The largest value of a probe over the phases; NaN where one is.
     fn worst_probe(&self, probe: usize) -> f64 {
-        largest(self.phases.iter().map(|phase| phase.probes[probe]))
+        largest(self.measured.phases.iter().map(|phase| phase.probes[probe]))
     }
 
     /// Names of the lines and probes that it missed.
@@ -213,8 +206,8 @@ impl Outcome {
         let base = Row {
             settings: self.tuning.to_string(),
             rate: Some(self.rate),
-            p99_us: self.times.update[1],
-            load: Some(self.load),
+            p99_us: self.measured.times.update[1],
+            load: Some(self.measured.load),
             ..Row::new(self.recipe, &self.case, self.method.name())
         };
         let limited = |key: &'static str, value: f64, unit: &str, limit: f64| {

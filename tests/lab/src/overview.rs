@@ -74,7 +74,10 @@ pub fn summaries(rows: &[Row], outcomes: &[Outcome]) -> Vec<Summary> {
             .map(|outcome| outcome.worst(Measure::JndP95))
             .filter(|felt| !felt.is_nan())
             .collect();
-        let shares: Vec<f64> = its.iter().map(|outcome| outcome.load.core).collect();
+        let shares: Vec<f64> = its
+            .iter()
+            .map(|outcome| outcome.measured.load.core)
+            .collect();
         (!its.is_empty()).then(|| Summary {
             method,
             rate,

@@ -179,7 +179,7 @@ fn measures(outcomes: &[Outcome]) -> String {
     }
     text.push('\n');
     for outcome in outcomes {
-        for (phase, values) in outcome.phases.iter().enumerate() {
+        for (phase, values) in outcome.measured.phases.iter().enumerate() {
             let _ = write!(text, "{},{phase}", keys(outcome));
             for measure in Measure::ALL {
                 let _ = write!(text, ",{:.6e}", values.get(*measure));
@@ -208,7 +208,8 @@ fn trials(outcomes: &[Outcome]) -> String {
 fn times(outcomes: &[Outcome]) -> String {
     let mut text = format!("{KEYS},update_p50_us,update_p99_us,force_p50_us,force_p99_us\n");
     for outcome in outcomes {
-        let ([u50, u99], [f50, f99]) = (outcome.times.update, outcome.times.force);
+        let times = outcome.measured.times;
+        let ([u50, u99], [f50, f99]) = (times.update, times.force);
         let _ = writeln!(
             text,
             "{},{u50:.2},{u99:.2},{f50:.2},{f99:.2}",

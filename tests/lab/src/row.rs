@@ -118,17 +118,6 @@ impl Row {
             ..self
         }
     }
-
-    /// Whether everything but the time is the same; NaN is NaN.
-    #[must_use]
-    pub fn same_answer(&self, other: &Self) -> bool {
-        let timeless = |row: &Self| Self {
-            value: 0.0,
-            p99_us: 0.0,
-            ..row.clone()
-        };
-        timeless(self) == timeless(other) && self.value.to_bits() == other.value.to_bits()
-    }
 }
 
 #[cfg(test)]
@@ -147,23 +136,5 @@ mod tests {
             Verdict::Fail
         );
         assert_eq!(row.at_most("m", f64::NAN, "N", 1.0).verdict, Verdict::Fail);
-    }
-
-    #[test]
-    fn times_may_differ_and_nothing_else() {
-        let row = Row::new("R00", "case", "ours").shown("m", f64::NAN, "N");
-        let later = Row {
-            p99_us: 3.0,
-            ..row.clone()
-        };
-        assert!(row.same_answer(&later));
-        assert!(!row.same_answer(&Row {
-            value: 1.0,
-            ..row.clone()
-        }));
-        assert!(!row.same_answer(&Row {
-            rate: Some(70),
-            ..row.clone()
-        }));
     }
 }

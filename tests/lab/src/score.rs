@@ -112,7 +112,7 @@ pub fn scores(recipes: &[&Recipe], outcomes: &[Outcome], methods: &[Method]) -> 
             scores.len() - 1
         });
         let score = &mut scores[index];
-        score.held = score.held.min(outcome.load.held);
+        score.held = score.held.min(outcome.measured.load.held);
         let missed = score.cases.entry(case).or_default();
         missed.extend(outcome.missed(recipe));
     }

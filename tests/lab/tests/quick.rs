@@ -3,7 +3,7 @@
 use taut_lab::clock::RATES;
 use taut_lab::costs::seed;
 use taut_lab::measure::{Measure, Measures};
-use taut_lab::measured::{Measured, Payer, TRAINING, judged};
+use taut_lab::measured::{Measured, TRAINING, judged};
 use taut_lab::method::{Method, Tuning};
 use taut_lab::outcome::{Outcome, reference_rows};
 use taut_lab::recipe::{Ideal, Line, Recipe};
@@ -232,8 +232,8 @@ fn r09_discrete_detection_pops_through_the_thinner_plate_unless_it_looks_ahead()
     assert!(discrete.worst(Measure::Astray) > 0.01);
     // From some start phases only: a step must span plate and cube.
     let through = |phase: &&Measures| phase.get(Measure::Astray) > 0.01;
-    let popped = discrete.phases.iter().filter(through).count();
-    assert!(popped < discrete.phases.len(), "{popped}");
+    let popped = discrete.measured.phases.iter().filter(through).count();
+    assert!(popped < discrete.measured.phases.len(), "{popped}");
 }
 
 /// Neither the phases nor the draws of costs that a tuning is chosen from are among those that it is judged on.
@@ -253,7 +253,7 @@ fn no_method_is_tuned_on_what_it_is_judged_on() {
         for trial in Outcome::of(&recipe, method, 300).trials {
             let tuning = trial.tuning;
             let start = || method.start(&recipe.scene, 1.0 / 300.0, tuning);
-            let payer = Some(Payer { method, tuning });
+            let payer = Some((method, tuning));
             let measured = Measured::of(&recipe, 300, &TRAINING, payer, start);
             let felt = measured.worst(Measure::JndP95);
             assert_eq!(trial.felt, felt, "{method:?}, {tuning}");

@@ -268,7 +268,7 @@ fn results_that_were_kept_are_the_same() {
         kept.outcomes
             .iter()
             .zip(&again.outcomes)
-            .all(|(a, b)| a.times == b.times)
+            .all(|(a, b)| a.measured.times == b.measured.times)
     );
 }
 

@@ -204,7 +204,7 @@ fn measured(results: &Results, predicted: &Prediction) -> Option<(f64, String, S
     // A line of measures.csv for each start phase, in the order of the outcomes.
     let mut line = 2;
     for outcome in &results.outcomes {
-        let last = line + outcome.phases.len() - 1;
+        let last = line + outcome.measured.phases.len() - 1;
         let is_it = (outcome.recipe, outcome.case.as_str()) == (predicted.recipe, predicted.case)
             && (outcome.method, outcome.rate) == (predicted.method, predicted.rate);
         if is_it {

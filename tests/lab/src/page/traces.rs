@@ -151,7 +151,11 @@ pub(crate) fn run(recipes: &[Recipe], outcomes: &[Outcome]) -> Vec<Trace> {
 fn worst_phase(outcomes: &[&Outcome], window: &Window) -> Option<usize> {
     let (method, measure) = window.worst;
     let outcome = outcomes.iter().find(|outcome| outcome.method == method)?;
-    let values = outcome.phases.iter().map(|phase| phase.get(measure));
+    let values = outcome
+        .measured
+        .phases
+        .iter()
+        .map(|phase| phase.get(measure));
     let worst = values.enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b));
     worst.map(|(phase, _)| phase)
 }

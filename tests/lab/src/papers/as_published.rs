@@ -43,7 +43,7 @@ fn figure(
 /// `peg`: in its hole, as in the paper's figure 11; `plane`: its figure 13.
 pub(super) fn figures(peg: &Recipe, plane: &Recipe) -> Vec<Figure> {
     let [in_hole, on_plane] = [peg, plane].map(|recipe| Outcome::of(recipe, Method::Paper, RATE));
-    let along = in_hole.phases.iter().map(|phase| phase.probes[0]);
+    let along = in_hole.measured.phases.iter().map(|phase| phase.probes[0]);
     let cost = costs::of(peg, Method::Paper, in_hole.tuning, RATE);
     let [update, force] = cost.map_or([f64::NAN; 2], |cost| [1e-3 * cost.update[2], cost.force]);
     vec![

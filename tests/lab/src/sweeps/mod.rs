@@ -213,7 +213,7 @@ fn run(recipe: &Recipe, rate: u32, settings: &Settings, store: &Store) -> Measur
     store.get(recipe.name, &key, Measured::from_numbers, || {
         let start = || Box::new(GodObjectMethod::new(&recipe.scene, settings)) as _;
         let measured = Measured::of(recipe, rate, &judged(recipe.phases), None, start);
-        let numbers = Measured::to_numbers(&measured.phases, &measured.times, &measured.load);
+        let numbers = measured.to_numbers();
         (measured, numbers)
     })
 }

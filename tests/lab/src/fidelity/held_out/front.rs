@@ -80,7 +80,8 @@ pub fn run(scenes: &[FidelityScene], directory: &Path) -> Result<Vec<Found>, Sce
         let players: Vec<_> = players.collect();
         found.extend(crew::map(crew::cores(), &players, |(method, rate)| {
             let outcome = Outcome::of(&recipe, *method, *rate);
-            let [update, force] = [outcome.times.update[0], outcome.times.force[0]];
+            let times = outcome.measured.times;
+            let [update, force] = [times.update[0], times.force[0]];
             Found {
                 scene: scene.name,
                 method: *method,
