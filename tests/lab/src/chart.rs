@@ -6,14 +6,13 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use crate::clock::RATES;
 use crate::measure::Measure;
 use crate::method::Method;
 use crate::outcome::Outcome;
-use crate::plot::{Frame, Mark, PANEL, front};
+use crate::plot::{Area, Drawn, Frame, Mark, PANEL, front, svg};
 use crate::report::{KEYS, keys};
 use crate::row::{Row, Verdict};
 
@@ -80,7 +79,7 @@ fn band(outcome: &Outcome) -> [f64; 2] {
 }
 
 /// Whether every row of an outcome is passed.
-fn passes(outcome: &Outcome, rows: &[Row]) -> bool {
+pub(crate) fn passes(outcome: &Outcome, rows: &[Row]) -> bool {
     let of_it = |row: &&Row| {
         row.recipe == outcome.recipe
             && row.case == outcome.case
@@ -104,6 +103,12 @@ pub(crate) fn panels(outcomes: &[Outcome]) -> Vec<(&str, &str)> {
     panels
 }
 
+/// The outcomes of a panel that have an error to draw.
+fn of_panel<'a>(panel: (&str, &str), outcomes: &'a [Outcome]) -> Vec<&'a Outcome> {
+    let of_it = |o: &&Outcome| (o.recipe, o.case.as_str()) == panel && !point(o).1.is_nan();
+    outcomes.iter().filter(of_it).collect()
+}
+
 /// Axes and points of a panel.
 pub(crate) fn panel(
     (recipe, case): (&str, &str),
@@ -119,9 +124,8 @@ pub(crate) fn panel(
         unit: "error felt, J at p95",
         error_line: Some(1.0),
     };
-    let of_panel = |o: &&Outcome| (o.recipe, o.case.as_str()) == (recipe, case);
-    let drawn = outcomes.iter().filter(of_panel);
-    let marks = drawn.filter(|o| !point(o).1.is_nan()).map(|outcome| {
+    let drawn = of_panel((recipe, case), outcomes).into_iter();
+    let marks = drawn.map(|outcome| {
         let size = RATES.iter().position(|rate| *rate == outcome.rate);
         Mark {
             place: point(outcome),
@@ -135,25 +139,32 @@ pub(crate) fn panel(
     (frame, marks.collect())
 }
 
-/// Writes `tradeoff.svg`: the panels of ten canonical scenes, as far as they were run.
-fn write_canonical(
-    rows: &[Row],
-    outcomes: &[Outcome],
-    directory: &Path,
-) -> Result<(), Box<dyn Error>> {
+/// `tradeoff.svg`: the panels of ten canonical scenes, as far as they were run; `None` where none was.
+fn canonical(rows: &[Row], outcomes: &[Outcome]) -> Result<Option<String>, Box<dyn Error>> {
     let drawn: Vec<_> = (CANONICAL.iter())
         .filter(|panel| panels(outcomes).contains(panel))
         .collect();
     if drawn.is_empty() {
-        return Ok(());
+        return Ok(None);
     }
     let lines = drawn.len().div_ceil(CANONICAL_COLUMNS);
     let width = PANEL.0 * CANONICAL_COLUMNS as u32;
-    let svg = directory.join("tradeoff.svg");
-    let root = SVGBackend::new(&svg, (width, PANEL.1 * lines as u32 + CANONICAL_HEAD));
-    let root = root.into_drawing_area();
-    root.fill(&WHITE)?;
-    let (head, grid) = root.split_vertically(CANONICAL_HEAD);
+    let size = (width, PANEL.1 * lines as u32 + CANONICAL_HEAD);
+    svg(size, |root| {
+        root.fill(&WHITE)?;
+        let (head, grid) = root.split_vertically(CANONICAL_HEAD);
+        draw_canonical_head(&head)?;
+        let areas = grid.split_evenly((lines, CANONICAL_COLUMNS));
+        for (area, name) in areas.iter().zip(drawn) {
+            let (frame, marks) = panel(*name, outcomes, rows);
+            frame.draw(area, &marks)?;
+        }
+        Ok(())
+    })
+    .map(Some)
+}
+
+fn draw_canonical_head(head: &Area<'_>) -> Drawn {
     let lines_of_head = [
         "Error felt against the share of one core that a method takes, all its loops",
         "down is better, left is cheaper; dot: every pass line is kept, cross: one is missed; bar: from the luckiest start phase to the worst; black line: Pareto front",
@@ -179,47 +190,43 @@ fn write_canonical(
         let label = format!("at most {rate} Hz");
         head.draw(&Text::new(label, (734, y - 8), ("sans-serif", 15)))?;
     }
-    let areas = grid.split_evenly((lines, CANONICAL_COLUMNS));
-    for (area, name) in areas.iter().zip(drawn) {
-        let (frame, marks) = panel(*name, outcomes, rows);
-        frame.draw(area, &marks)?;
-    }
-    root.present()?;
     Ok(())
 }
 
 /// Writes `speed-accuracy.svg`, `tradeoff.svg` and `chart.csv`.
 pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(), Box<dyn Error>> {
-    write_canonical(rows, outcomes, directory)?;
+    if let Some(picture) = canonical(rows, outcomes)? {
+        std::fs::write(directory.join("tradeoff.svg"), picture)?;
+    }
     let panels = panels(outcomes);
     let lines = panels.len().div_ceil(COLUMNS).max(1);
-    let svg = directory.join("speed-accuracy.svg");
     let size = (PANEL.0 * COLUMNS as u32, PANEL.1 * lines as u32 + 112);
-    let root = SVGBackend::new(&svg, size).into_drawing_area();
-    root.fill(&WHITE)?;
-    let root = root.titled(
-        "Error felt against the share of one core that a method takes",
-        ("sans-serif", 22),
-    )?;
-    let (legend, grid) = root.split_vertically(72);
-    draw_legend(&legend)?;
+    let picture = svg(size, |root| {
+        root.fill(&WHITE)?;
+        let root = root.titled(
+            "Error felt against the share of one core that a method takes",
+            ("sans-serif", 22),
+        )?;
+        let (legend, grid) = root.split_vertically(72);
+        draw_legend(&legend)?;
+        for (area, name) in grid.split_evenly((lines, COLUMNS)).iter().zip(&panels) {
+            let (frame, marks) = panel(*name, outcomes, rows);
+            frame.draw(area, &marks)?;
+        }
+        Ok(())
+    })?;
+    std::fs::write(directory.join("speed-accuracy.svg"), picture)?;
+    std::fs::write(directory.join("chart.csv"), csv(&panels, outcomes)?)?;
+    Ok(())
+}
+
+fn csv(panels: &[(&str, &str)], outcomes: &[Outcome]) -> Result<String, std::fmt::Error> {
     let mut csv = format!("panel,{KEYS},held_hz,j_p95,core_share,on_front,j_p95_luckiest_phase\n");
-    for (index, (area, panel)) in grid
-        .split_evenly((lines, COLUMNS))
-        .iter()
-        .zip(&panels)
-        .enumerate()
-    {
-        let of_panel: Vec<&Outcome> = outcomes
-            .iter()
-            .filter(|o| (o.recipe, o.case.as_str()) == *panel)
-            .filter(|o| !point(o).1.is_nan())
-            .collect();
-        let points: Vec<_> = of_panel.iter().map(|o| point(o)).collect();
+    for (index, panel) in panels.iter().enumerate() {
+        let drawn = of_panel(*panel, outcomes);
+        let points: Vec<_> = drawn.iter().map(|o| point(o)).collect();
         let front = front(&points);
-        let (frame, marks) = self::panel(*panel, outcomes, rows);
-        frame.draw(area, &marks)?;
-        for outcome in of_panel {
+        for outcome in drawn {
             let (share, felt) = point(outcome);
             let on_front = front.contains(&(share, felt));
             let held = outcome.measured.load.held;
@@ -231,13 +238,10 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
             )?;
         }
     }
-    root.present()?;
-    drop(grid);
-    std::fs::write(directory.join("chart.csv"), csv)?;
-    Ok(())
+    Ok(csv)
 }
 
-fn draw_legend(area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), Box<dyn Error>> {
+fn draw_legend(area: &Area<'_>) -> Drawn {
     for (index, method) in Method::ALL.into_iter().enumerate() {
         let (column, line) = (index % LEGEND_COLUMNS, index / LEGEND_COLUMNS);
         let (x, y) = (30 + 160 * column as i32, 16 + 20 * line as i32);

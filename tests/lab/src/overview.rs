@@ -7,17 +7,16 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use crate::chart::colour;
+use crate::chart::{colour, passes};
 use crate::clock::RATES;
 use crate::cpu_time::quantile;
 use crate::measure::Measure;
 use crate::method::Method;
 use crate::outcome::Outcome;
-use crate::plot::front;
-use crate::row::{Row, Verdict};
+use crate::plot::{self, Area, Drawn, front};
+use crate::row::Row;
 
 /// Pixels: width and least height, and the height of the bars of a method with its name.
 const SIZE: (u32, u32) = (960, 500);
@@ -59,15 +58,6 @@ pub fn summaries(rows: &[Row], outcomes: &[Outcome]) -> Vec<Summary> {
             .iter()
             .filter(|outcome| (outcome.method, outcome.rate) == (method, rate))
             .collect();
-        let passes = |outcome: &&&Outcome| {
-            let of_it = |row: &&Row| {
-                (row.recipe, &row.case) == (outcome.recipe, &outcome.case)
-                    && row.method == method.name()
-                    && row.rate == Some(rate)
-            };
-            let missed = |row: &Row| matches!(row.verdict, Verdict::Fail | Verdict::Open(_));
-            !rows.iter().filter(of_it).any(missed)
-        };
         let quartiles = |values: &[f64]| [0.25, 0.5, 0.75].map(|share| quantile(values, share));
         let felt: Vec<f64> = its
             .iter()
@@ -82,7 +72,7 @@ pub fn summaries(rows: &[Row], outcomes: &[Outcome]) -> Vec<Summary> {
             method,
             rate,
             cases: its.len(),
-            passed: its.iter().filter(passes).count(),
+            passed: its.iter().filter(|outcome| passes(outcome, rows)).count(),
             felt: quartiles(&felt),
             core: quartiles(&shares),
         })
@@ -127,12 +117,19 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
 
 /// The picture as a text that can stand in a page.
 pub(crate) fn svg(summaries: &[Summary]) -> Result<String, Box<dyn Error>> {
-    let mut text = String::new();
     let methods = summaries.chunk_by(|a, b| a.method == b.method).count() as u32;
     let height = SIZE.1.max(HEAD + 50 + methods * BARS as u32);
-    let root = SVGBackend::with_string(&mut text, (SIZE.0, height)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (head, body) = root.split_vertically(HEAD);
+    plot::svg((SIZE.0, height), |root| {
+        root.fill(&WHITE)?;
+        let (top, body) = root.split_vertically(HEAD);
+        head(&top, summaries)?;
+        let (left, right) = body.split_horizontally(SCATTER);
+        scatter(&left, summaries)?;
+        bars(&right, summaries)
+    })
+}
+
+fn head(head: &Area<'_>, summaries: &[Summary]) -> Drawn {
     let cases = summaries.iter().map(|summary| summary.cases).max();
     let title = format!(
         "Haptic methods in {} cases of recipes in which they are known to fail",
@@ -152,18 +149,10 @@ pub(crate) fn svg(summaries: &[Summary]) -> Result<String, Box<dyn Error>> {
         ))?;
         x += 100;
     }
-    let (left, right) = body.split_horizontally(SCATTER);
-    scatter(&left, summaries)?;
-    bars(&right, summaries)?;
-    root.present()?;
-    drop((head, left, right, body, root));
-    Ok(text)
+    Ok(())
 }
 
-fn scatter(
-    area: &DrawingArea<SVGBackend<'_>, Shift>,
-    summaries: &[Summary],
-) -> Result<(), Box<dyn Error>> {
+fn scatter(area: &Area<'_>, summaries: &[Summary]) -> Drawn {
     let mut chart = ChartBuilder::on(area)
         .margin(10)
         .x_label_area_size(38)
@@ -213,10 +202,7 @@ fn scatter(
 }
 
 /// A line for each method, a bar for each rate: the share of cases passed. They are the legend, too.
-fn bars(
-    area: &DrawingArea<SVGBackend<'_>, Shift>,
-    summaries: &[Summary],
-) -> Result<(), Box<dyn Error>> {
+fn bars(area: &Area<'_>, summaries: &[Summary]) -> Drawn {
     let (width, _) = area.dim_in_pixel();
     let of_method = |method| summaries.iter().filter(move |s| s.method == method);
     let methods: Vec<Method> = Method::ALL

@@ -5,6 +5,23 @@ use std::error::Error;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
+/// What is drawn on: a picture or a part of it.
+pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(crate) type Drawn = Result<(), Box<dyn Error>>;
+
+/// A picture as a text that can stand in a page.
+pub(crate) fn svg(
+    size: (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> Drawn,
+) -> Result<String, Box<dyn Error>> {
+    let mut text = String::new();
+    let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
+    draw(&area)?;
+    area.present()?;
+    drop(area);
+    Ok(text)
+}
+
 /// Size of a panel, pixels.
 pub(crate) const PANEL: (u32, u32) = (460, 340);
 
@@ -53,14 +70,7 @@ impl Frame {
     }
 
     /// Draws marks and their front.
-    pub(crate) fn draw<B: DrawingBackend>(
-        &self,
-        area: &DrawingArea<B, Shift>,
-        marks: &[Mark],
-    ) -> Result<(), Box<dyn Error>>
-    where
-        B::ErrorType: 'static,
-    {
+    pub(crate) fn draw(&self, area: &Area<'_>, marks: &[Mark]) -> Drawn {
         let ([left, right], [bottom, top]) = (self.costs, self.errors);
         let mut chart = ChartBuilder::on(area)
             .margin(10)
@@ -118,12 +128,7 @@ impl Frame {
 
     /// The panel alone, as a text that can stand in a page.
     pub(crate) fn svg(&self, marks: &[Mark]) -> Result<String, Box<dyn Error>> {
-        let mut text = String::new();
-        let area = SVGBackend::with_string(&mut text, PANEL).into_drawing_area();
-        self.draw(&area, marks)?;
-        area.present()?;
-        drop(area);
-        Ok(text)
+        svg(PANEL, |area| self.draw(area, marks))
     }
 }
 

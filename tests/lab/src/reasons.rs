@@ -7,11 +7,11 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use crate::chart::colour;
 use crate::clock::RATES;
+use crate::plot::{self, Area, Drawn};
 use crate::score::Score;
 
 /// Pixels: a cell, the column of names, the head with the names of the lines, the foot.
@@ -83,8 +83,6 @@ fn missed(score: &Score, lines: &[&str]) -> usize {
     score.cases.values().filter(misses).count()
 }
 
-type Drawn = Result<(), Box<dyn Error>>;
-
 fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
     let columns = columns(scores);
     let of_rate = |rate: u32| scores.iter().filter(move |score| score.rate == rate);
@@ -95,29 +93,26 @@ fn svg(scores: &[Score]) -> Result<String, Box<dyn Error>> {
         .collect();
     let height = HEAD + FOOT + scores.len() as i32 * CELL.1 + rates.len() as i32 * GAP;
     let width = NAMES + (columns.len() as i32 + 1) * CELL.0 + 40;
-    let mut text = String::new();
-    let root =
-        SVGBackend::with_string(&mut text, (width as u32, height as u32)).into_drawing_area();
-    root.fill(&WHITE)?;
     let cases = scores.iter().map(|score| score.cases.len()).max();
-    let picture = Picture {
-        root,
-        columns,
-        cases: cases.unwrap_or(0),
-    };
-    picture.head()?;
-    let mut y = HEAD;
-    for rate in rates {
-        picture.write(&format!("{rate} Hz"), (16, y - 18), 15)?;
-        for score in of_rate(rate) {
-            picture.row(y, score)?;
-            y += CELL.1;
+    plot::svg((width as u32, height as u32), |root| {
+        root.fill(&WHITE)?;
+        let picture = Picture {
+            root: root.clone(),
+            columns,
+            cases: cases.unwrap_or(0),
+        };
+        picture.head()?;
+        let mut y = HEAD;
+        for rate in rates {
+            picture.write(&format!("{rate} Hz"), (16, y - 18), 15)?;
+            for score in of_rate(rate) {
+                picture.row(y, score)?;
+                y += CELL.1;
+            }
+            y += GAP;
         }
-        y += GAP;
-    }
-    picture.root.present()?;
-    drop(picture);
-    Ok(text)
+        Ok(())
+    })
 }
 
 /// Where a column begins; the first is that of the cases within the budget.
@@ -126,7 +121,7 @@ fn left(column: usize) -> i32 {
 }
 
 struct Picture<'a> {
-    root: DrawingArea<SVGBackend<'a>, Shift>,
+    root: Area<'a>,
     columns: Vec<Column>,
     /// The most that a method has.
     cases: usize,

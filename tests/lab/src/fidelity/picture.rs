@@ -2,10 +2,10 @@
 
 use std::error::Error;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::sweep::{BUDGET, Swept};
+use crate::plot::{self, Area, Drawn};
 
 /// Pixels: width, a scene's line, head and foot, the column of names, the column of ratios.
 const WIDTH: i32 = 960;
@@ -27,31 +27,26 @@ fn ends(swept: &[Swept]) -> [f64; 2] {
     [least, most.max(least + 1.0)]
 }
 
-type Drawn = Result<(), Box<dyn Error>>;
-
 /// The picture as a text; a row for each scene.
 pub fn svg(swept: &[Swept]) -> Result<String, Box<dyn Error>> {
     let height = HEAD + FOOT + LINE * swept.len() as i32;
-    let mut text = String::new();
-    let root =
-        SVGBackend::with_string(&mut text, (WIDTH as u32, height as u32)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let picture = Picture {
-        root,
-        ends: ends(swept),
-    };
-    picture.head()?;
-    picture.axis(height - FOOT)?;
-    for (index, s) in swept.iter().enumerate() {
-        picture.row(HEAD + LINE * index as i32 + LINE / 2, s)?;
-    }
-    picture.root.present()?;
-    drop(picture);
-    Ok(text)
+    plot::svg((WIDTH as u32, height as u32), |root| {
+        root.fill(&WHITE)?;
+        let picture = Picture {
+            root: root.clone(),
+            ends: ends(swept),
+        };
+        picture.head()?;
+        picture.axis(height - FOOT)?;
+        for (index, s) in swept.iter().enumerate() {
+            picture.row(HEAD + LINE * index as i32 + LINE / 2, s)?;
+        }
+        Ok(())
+    })
 }
 
 struct Picture<'a> {
-    root: DrawingArea<SVGBackend<'a>, Shift>,
+    root: Area<'a>,
     ends: [f64; 2],
 }
 

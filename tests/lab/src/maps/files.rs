@@ -4,12 +4,11 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::{MAPS, METHODS, Map, Point};
 use crate::chart::colour;
-use crate::plot::PANEL;
+use crate::plot::{Area, Drawn, PANEL, svg};
 
 /// Of the lines of theory: eigenvalues, the rule, the bound of passivity.
 pub(crate) const COLOURS: [(RGBColor, &str); 3] = [
@@ -50,14 +49,7 @@ fn csv(points: &[Point]) -> String {
 
 /// One panel for each map, as texts that can stand in a page.
 pub(crate) fn panels(points: &[Point]) -> Result<Vec<String>, Box<dyn Error>> {
-    let panel = |map: &Map| {
-        let mut text = String::new();
-        let area = SVGBackend::with_string(&mut text, PANEL).into_drawing_area();
-        draw(&area, map, points)?;
-        area.present()?;
-        drop(area);
-        Ok(text)
-    };
+    let panel = |map| svg(PANEL, |area| draw(area, map, points));
     MAPS.iter().map(panel).collect()
 }
 
@@ -66,9 +58,13 @@ pub fn write(points: &[Point], directory: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(directory)?;
     std::fs::write(directory.join("stability-methods.csv"), csv(points))?;
     let lines = MAPS.len().div_ceil(COLUMNS) as u32;
-    let file = directory.join("stability-methods.svg");
     let size = (PANEL.0 * COLUMNS as u32, PANEL.1 * lines + HEAD);
-    let root = SVGBackend::new(&file, size).into_drawing_area();
+    let picture = svg(size, |root| draw_all(root, lines, points))?;
+    std::fs::write(directory.join("stability-methods.svg"), picture)?;
+    Ok(())
+}
+
+fn draw_all(root: &Area<'_>, lines: u32, points: &[Point]) -> Drawn {
     root.fill(&WHITE)?;
     let (head, grid) = root.split_vertically(HEAD);
     let title = "Stiffest contact that is stable: each method (points) beside theory (lines)";
@@ -93,18 +89,10 @@ pub fn write(points: &[Point], directory: &Path) -> Result<(), Box<dyn Error>> {
     {
         draw(area, map, points)?;
     }
-    root.present()?;
     Ok(())
 }
 
-fn draw<B: DrawingBackend>(
-    area: &DrawingArea<B, Shift>,
-    map: &Map,
-    points: &[Point],
-) -> Result<(), Box<dyn Error>>
-where
-    B::ErrorType: 'static,
-{
+fn draw(area: &Area<'_>, map: &Map, points: &[Point]) -> Drawn {
     let of_map: Vec<&Point> = points
         .iter()
         .filter(|point| point.map == map.name)

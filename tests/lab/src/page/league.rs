@@ -4,9 +4,9 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
+use crate::plot::{self, Area, Drawn};
 use crate::recipe::JND_BUDGET;
 
 /// The committed rows.
@@ -208,24 +208,15 @@ fn svg(league: &League) -> Result<String, Box<dyn Error>> {
     let cells = NAMES + CELL.0 * league.engines.len() as i32;
     let rows = HEAD + CELL.1 * league.scenes.len() as i32;
     let size = (PANEL.0 + cells as u32 + 16, PANEL.1.max(rows as u32) + FOOT);
-    let mut text = String::new();
-    let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (left, right) = root.split_horizontally(PANEL.0);
-    draw_costs(league, &left)?;
-    draw_scenes(league, &right)?;
-    root.present()?;
-    drop((left, right, root));
-    Ok(text)
+    plot::svg(size, |root| {
+        root.fill(&WHITE)?;
+        let (left, right) = root.split_horizontally(PANEL.0);
+        draw_costs(league, &left)?;
+        draw_scenes(league, &right)
+    })
 }
 
-fn draw_costs<B: DrawingBackend>(
-    league: &League,
-    area: &DrawingArea<B, Shift>,
-) -> Result<(), Box<dyn Error>>
-where
-    B::ErrorType: 'static,
-{
+fn draw_costs(league: &League, area: &Area<'_>) -> Drawn {
     let mut chart = ChartBuilder::on(area)
         .margin(10)
         .caption(
@@ -270,13 +261,7 @@ where
     Ok(())
 }
 
-fn draw_scenes<B: DrawingBackend>(
-    league: &League,
-    area: &DrawingArea<B, Shift>,
-) -> Result<(), Box<dyn Error>>
-where
-    B::ErrorType: 'static,
-{
+fn draw_scenes(league: &League, area: &Area<'_>) -> Drawn {
     let write = |text: &str, (x, y): (i32, i32)| {
         area.draw(&Text::new(text.to_owned(), (x, y), ("sans-serif", 13)))
     };

@@ -17,7 +17,7 @@ use crate::measure::Measure;
 use crate::measured::judged;
 use crate::method::Method;
 use crate::outcome::Outcome;
-use crate::plot::PANEL;
+use crate::plot::{self, PANEL};
 use crate::port;
 use crate::recipe::Recipe;
 use crate::report::quoted;
@@ -227,35 +227,32 @@ fn svg(window: &Window, traces: &[&Trace]) -> Result<String, Box<dyn Error>> {
     let least = values().fold(0.0, f64::min);
     let most = values().fold(0.0, f64::max);
     let room = 0.06 * (most - least).max(1e-3);
-    let mut text = String::new();
-    let area = SVGBackend::with_string(&mut text, PANEL).into_drawing_area();
-    let mut chart = ChartBuilder::on(&area)
-        .margin(10)
-        .x_label_area_size(34)
-        .y_label_area_size(58)
-        .build_cartesian_2d(window.from..window.to, least - room..most + room)?;
-    chart
-        .configure_mesh()
-        .x_desc("time, s")
-        .y_desc(window.component.1)
-        .x_labels(6)
-        .y_labels(6)
-        .label_style(("sans-serif", 13))
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(RGBColor(238, 238, 238))
-        .draw()?;
-    // The project's own and the right answer come last, and so on top.
-    let (first, others): (Vec<&Trace>, Vec<&Trace>) = traces
-        .iter()
-        .partition(|trace| matches!(trace.method, None | Some(Method::Ours)));
-    for trace in others.into_iter().chain(first.into_iter().rev()) {
-        let ink = trace.method.map_or(BLACK, colour);
-        let width = if trace.method.is_some() { 2 } else { 1 };
-        let line = trace.samples.iter().copied().filter(|s| s.1.is_finite());
-        chart.draw_series(LineSeries::new(line, ink.stroke_width(width)))?;
-    }
-    area.present()?;
-    drop(chart);
-    drop(area);
-    Ok(text)
+    plot::svg(PANEL, |area| {
+        let mut chart = ChartBuilder::on(area)
+            .margin(10)
+            .x_label_area_size(34)
+            .y_label_area_size(58)
+            .build_cartesian_2d(window.from..window.to, least - room..most + room)?;
+        chart
+            .configure_mesh()
+            .x_desc("time, s")
+            .y_desc(window.component.1)
+            .x_labels(6)
+            .y_labels(6)
+            .label_style(("sans-serif", 13))
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(RGBColor(238, 238, 238))
+            .draw()?;
+        // The project's own and the right answer come last, and so on top.
+        let (first, others): (Vec<&Trace>, Vec<&Trace>) = traces
+            .iter()
+            .partition(|trace| matches!(trace.method, None | Some(Method::Ours)));
+        for trace in others.into_iter().chain(first.into_iter().rev()) {
+            let ink = trace.method.map_or(BLACK, colour);
+            let width = if trace.method.is_some() { 2 } else { 1 };
+            let line = trace.samples.iter().copied().filter(|s| s.1.is_finite());
+            chart.draw_series(LineSeries::new(line, ink.stroke_width(width)))?;
+        }
+        Ok(())
+    })
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use plotters::prelude::*;
 
 use super::{Cost, Point, SHOWN, Sweep};
-use crate::plot::{Frame, Mark, PANEL, front};
+use crate::plot::{Frame, Mark, PANEL, front, svg};
 use crate::report::quoted;
 
 /// Colours of settings, or of kinds of settings, in their order.
@@ -183,24 +183,25 @@ pub fn write(sweep: &Sweep, points: &[Point], directory: &Path) -> Result<(), Bo
         PANEL.0 * COLUMNS as u32,
         PANEL.1 * lines as u32 + head_height,
     );
-    let file = directory.join(&name).with_extension("svg");
-    let root = SVGBackend::new(&file, size).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (head, grid) = root.split_vertically(head_height);
-    head.draw(&Text::new(sweep.about, (20, 10), ("sans-serif", 16)))?;
-    let step = (size.0 as i32 - 40) / LEGEND_COLUMNS as i32;
-    for (index, (setting, colour)) in legend.iter().enumerate() {
-        let (x, y) = (
-            30 + (index % LEGEND_COLUMNS) as i32 * step,
-            46 + (index / LEGEND_COLUMNS) as i32 * LEGEND_LINE as i32,
-        );
-        head.draw(&Circle::new((x, y), RADIUS, colour.filled()))?;
-        head.draw(&Text::new(*setting, (x + 12, y - 7), ("sans-serif", 14)))?;
-    }
-    for (area, (frame, marks)) in grid.split_evenly((lines, COLUMNS)).iter().zip(&panels) {
-        frame.draw(area, marks)?;
-    }
-    root.present()?;
+    let picture = svg(size, |root| {
+        root.fill(&WHITE)?;
+        let (head, grid) = root.split_vertically(head_height);
+        head.draw(&Text::new(sweep.about, (20, 10), ("sans-serif", 16)))?;
+        let step = (size.0 as i32 - 40) / LEGEND_COLUMNS as i32;
+        for (index, (setting, colour)) in legend.iter().enumerate() {
+            let (x, y) = (
+                30 + (index % LEGEND_COLUMNS) as i32 * step,
+                46 + (index / LEGEND_COLUMNS) as i32 * LEGEND_LINE as i32,
+            );
+            head.draw(&Circle::new((x, y), RADIUS, colour.filled()))?;
+            head.draw(&Text::new(*setting, (x + 12, y - 7), ("sans-serif", 14)))?;
+        }
+        for (area, (frame, marks)) in grid.split_evenly((lines, COLUMNS)).iter().zip(&panels) {
+            frame.draw(area, marks)?;
+        }
+        Ok(())
+    })?;
+    std::fs::write(directory.join(&name).with_extension("svg"), picture)?;
     Ok(())
 }
 
