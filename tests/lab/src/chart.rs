@@ -14,7 +14,7 @@ use crate::method::Method;
 use crate::outcome::Outcome;
 use crate::plot::{Area, Drawn, Frame, Mark, PANEL, front, svg};
 use crate::report::{KEYS, keys};
-use crate::row::{Row, Verdict};
+use crate::row::Row;
 
 /// Range of the axes: shares of a core and just-noticeable differences.
 const SHARES: [f64; 2] = [1e-4, 3.0];
@@ -86,8 +86,7 @@ pub(crate) fn passes(outcome: &Outcome, rows: &[Row]) -> bool {
             && row.method == outcome.method.name()
             && row.rate == Some(outcome.rate)
     };
-    let missed = |row: &Row| matches!(row.verdict, Verdict::Fail | Verdict::Open(_));
-    !rows.iter().filter(of_it).any(missed)
+    !rows.iter().filter(of_it).any(Row::is_missed)
 }
 
 /// The panels that have errors to draw: recipe and case, in their order.

@@ -133,16 +133,9 @@ fn reasons(scores: &[Score]) -> String {
     let mut text =
         String::from("| method | 1000 Hz | 300 Hz | 70 Hz |\n| --- | --- | --- | --- |\n");
     let listed = |score: &Score| {
-        let reasons = score.reasons();
-        let reasons = reasons
-            .iter()
-            .map(|(line, cases)| format!("`{line}` {cases}"));
-        let reasons = reasons.collect::<Vec<_>>().join(", ");
-        if reasons.is_empty() {
-            "none".to_owned()
-        } else {
-            reasons
-        }
+        let reasons = score.reasons().into_iter();
+        let reasons: Vec<_> = reasons.map(|(line, n)| format!("`{line}` {n}")).collect();
+        or_none(reasons.join(", "))
     };
     for method in run_methods(scores) {
         let _ = writeln!(
@@ -155,21 +148,20 @@ fn reasons(scores: &[Score]) -> String {
     text
 }
 
+fn or_none(listed: String) -> String {
+    match listed.is_empty() {
+        true => "none".to_owned(),
+        false => listed,
+    }
+}
+
 fn outside(scores: &[Score]) -> String {
     let mut text = String::new();
     for method in run_methods(scores) {
         let Some(score) = score_of(scores, method, RATES[RATES.len() - 1]) else {
             continue;
         };
-        let missed = score.cases.iter().filter(|(_, lines)| !lines.is_empty());
-        let names: Vec<_> = missed
-            .map(|((name, case), _)| format!("{name} {case}"))
-            .collect();
-        let names = if names.is_empty() {
-            "none".to_owned()
-        } else {
-            names.join("; ")
-        };
+        let names = or_none(score.outside().join("; "));
         let _ = writeln!(text, "- **{}**: {names}.", method.name());
     }
     text

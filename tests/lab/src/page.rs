@@ -11,9 +11,8 @@ use std::fmt::Write as _;
 use plotters::style::RGBColor;
 
 use crate::clock::RATES;
-use crate::measure::Measure;
 use crate::method::Method;
-use crate::report::{brief, verdict};
+use crate::report::{brief, felt, verdict};
 use crate::row::{Row, Verdict};
 use crate::run::{Results, is_own};
 use crate::sweeps::{self, Point, Sweep};
@@ -92,6 +91,12 @@ fn line_of(results: &Results, row: &Row) -> usize {
     place.map_or(0, |index| index + 2)
 }
 
+/// What a recipe or study is about.
+fn about(results: &Results, name: &str) -> String {
+    let about = results.about.iter().rfind(|(of, _)| *of == name); // a recipe comes after its study
+    escaped(about.map_or("", |(_, about)| about))
+}
+
 /// Class of a cell, by the verdict on its rows.
 fn class(rows: &[Row]) -> &'static str {
     let text = verdict(rows);
@@ -163,10 +168,7 @@ fn summary(page: &mut String, results: &Results) -> std::fmt::Result {
 /// What this project's method does not keep at any rate, and what else of its own fails.
 fn not_kept(page: &mut String, results: &Results) -> std::fmt::Result {
     page.push_str("<h2>Open and failed rows of this project's own</h2>\n");
-    let ours = |row: &&Row| {
-        let missed = matches!(row.verdict, Verdict::Fail | Verdict::Open(_));
-        missed && (is_own(row) || row.method == Method::Ours.name())
-    };
+    let ours = |row: &&Row| row.is_missed() && (is_own(row) || row.method == Method::Ours.name());
     let missed: Vec<&Row> = results.rows.iter().filter(ours).collect();
     if missed.is_empty() {
         page.push_str("<p>None.</p>\n");
@@ -177,12 +179,12 @@ fn not_kept(page: &mut String, results: &Results) -> std::fmt::Result {
     );
     for row in missed {
         let (class, reason) = match &row.verdict {
-            Verdict::Open(reason) => ("open", *reason),
-            _ => ("fail", ""),
+            Verdict::Open(reason) => ("open", format!(": {}", escaped(reason))),
+            _ => ("fail", String::new()),
         };
         writeln!(
             page,
-            "<tr><td><a href=\"#{0}\">{0}</a><td>{1}<td>{2}<td>{3}<td>{4}<td>{5} {6}<td>{7}<td class={class}>{8}{9}<td>{10}",
+            "<tr><td><a href=\"#{0}\">{0}</a><td>{1}<td>{2}<td>{3}<td>{4}<td>{5} {6}<td>{7}<td class={class}>{8}{reason}<td>{9}",
             row.recipe,
             escaped(&row.case),
             escaped(&row.method),
@@ -193,11 +195,6 @@ fn not_kept(page: &mut String, results: &Results) -> std::fmt::Result {
             escaped(&row.unit),
             row.limit.map_or_else(String::new, brief),
             row.verdict,
-            if reason.is_empty() {
-                String::new()
-            } else {
-                format!(": {}", escaped(reason))
-            },
             line_of(results, row),
         )?;
     }
@@ -208,9 +205,8 @@ fn not_kept(page: &mut String, results: &Results) -> std::fmt::Result {
 /// One recipe: case by case its table, and its chart where there is an error to draw.
 fn section(page: &mut String, results: &Results, rows: &[Row]) -> Result<(), Box<dyn Error>> {
     let name = rows[0].recipe;
-    let about = results.about.iter().rfind(|(of, _)| *of == name); // a recipe comes after its study
-    let about = about.map_or("", |(_, about)| about);
-    writeln!(page, "<h2 id={name}>{name}: {}</h2>", escaped(about))?;
+    let about = about(results, name);
+    writeln!(page, "<h2 id={name}>{name}: {about}</h2>")?;
     let panels = chart::panels(&results.outcomes);
     if panels.iter().any(|(recipe, _)| *recipe == name) {
         legend(page);
@@ -317,10 +313,8 @@ fn cell_of(page: &mut String, results: &Results, cell: &[Row], wide: usize) -> s
     if short.starts_with("out") {
         return write!(page, ": {}", escaped(long));
     }
-    if let Some(felt) = cell.iter().find(|row| row.measure == Measure::JndP95.key())
-        && !felt.value.is_nan()
-    {
-        write!(page, ", J {}", brief(felt.value))?;
+    if let Some(felt) = felt(cell).filter(|felt| !felt.is_nan()) {
+        write!(page, ", J {}", brief(felt))?;
     }
     if cell[0].p99_us.is_finite() {
         write!(page, ", {} us", brief(cell[0].p99_us))?;

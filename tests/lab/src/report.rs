@@ -75,10 +75,7 @@ pub fn table(rows: &[Row]) -> String {
     for group in rows.chunk_by(|a, b| player(a) == player(b)) {
         let (recipe, case, method, settings, rate) = player(&group[0]);
         let rate = rate.map_or_else(String::new, |rate| format!("{rate} Hz"));
-        let felt = group
-            .iter()
-            .find(|row| row.measure == Measure::JndP95.key());
-        let felt = felt.map_or_else(String::new, |row| brief(row.value));
+        let felt = felt(group).map_or_else(String::new, brief);
         let verdict = verdict(group);
         let load = group[0].load.map_or_else(
             || "|".to_owned(),
@@ -90,6 +87,12 @@ pub fn table(rows: &[Row]) -> String {
         );
     }
     text
+}
+
+/// The error felt, among the rows of a player; NaN where there is no right answer.
+pub(crate) fn felt(rows: &[Row]) -> Option<f64> {
+    let its = rows.iter().find(|row| row.measure == Measure::JndP95.key());
+    its.map(|row| row.value)
 }
 
 fn player(row: &Row) -> (&str, &str, &str, &str, Option<u32>) {

@@ -110,6 +110,11 @@ impl Row {
         self.at_most(measure, times as f64, "times", 0.0)
     }
 
+    /// Whether its pass line is not kept, be that known or not.
+    pub(crate) fn is_missed(&self) -> bool {
+        matches!(self.verdict, Verdict::Fail | Verdict::Open(_))
+    }
+
     /// Why it was not run.
     #[must_use]
     pub fn out_of_scope(self, reason: impl fmt::Display) -> Self {

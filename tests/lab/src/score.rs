@@ -24,26 +24,35 @@ pub struct Score {
 }
 
 impl Score {
+    /// How many cases miss none of the lines that count.
+    fn keeping(&self, counts: impl Fn(&str) -> bool) -> usize {
+        let cases = self.cases.values();
+        let kept = cases.filter(|missed| !missed.iter().any(|line| counts(line)));
+        kept.count()
+    }
+
     /// How many cases are within the budget.
     pub fn within(&self) -> usize {
-        self.cases
-            .values()
-            .filter(|missed| missed.is_empty())
-            .count()
+        self.keeping(|_| true)
     }
 
     /// How many keep the two lines of what is felt, whatever else they miss.
     pub fn felt(&self) -> usize {
         let felt = [Measure::JndP95, Measure::JndShare].map(Measure::key);
-        let kept = |missed: &BTreeSet<_>| felt.iter().all(|line| !missed.contains(line));
-        self.cases.values().filter(|missed| kept(missed)).count()
+        self.keeping(|line| felt.contains(&line))
     }
 
     /// How many would be within the budget if bodies might meet: a penalty method has no body that stays outside.
     pub fn within_where_bodies_may_meet(&self) -> usize {
         let meeting = [Measure::Intersections, Measure::Penetration].map(Measure::key);
-        let kept = |missed: &BTreeSet<_>| missed.iter().all(|line| meeting.contains(line));
-        self.cases.values().filter(|missed| kept(missed)).count()
+        self.keeping(|line| !meeting.contains(&line))
+    }
+
+    /// The cases that are not within the budget, by name.
+    pub(crate) fn outside(&self) -> Vec<String> {
+        let outside = self.cases.iter().filter(|(_, missed)| !missed.is_empty());
+        let named = outside.map(|((name, case), _)| format!("{name} {case}"));
+        named.collect()
     }
 
     /// Each line that was missed, and in how many cases; the one that most missed comes first.
@@ -59,10 +68,7 @@ impl Score {
 
     /// `n of m common cases within the budget`, how many are by less, the lines that were missed, and the cases that are not by name.
     pub fn headline(&self) -> String {
-        let outside: Vec<String> = (self.cases.iter())
-            .filter(|(_, missed)| !missed.is_empty())
-            .map(|((name, case), _)| format!("{name} {case}"))
-            .collect();
+        let outside = self.outside();
         let outside = if outside.is_empty() {
             String::new()
         } else {

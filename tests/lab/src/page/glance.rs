@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use super::{class, escaped, line_of, players};
+use super::{about, class, escaped, line_of, players};
 use crate::clock::RATES;
 use crate::measure::Measure;
 use crate::method::Method;
-use crate::report::brief;
+use crate::report::{brief, felt};
 use crate::row::{Row, Verdict};
 use crate::run::{OWN_RATE, Results};
 
@@ -35,13 +35,8 @@ fn matrix(page: &mut String, results: &Results, rate: u32) -> std::fmt::Result {
             continue;
         }
         let name = recipe[0].recipe;
-        let about = results.about.iter().rfind(|(of, _)| *of == name);
-        let about = about.map_or("", |(_, about)| about);
-        write!(
-            page,
-            "\n<tr><td><a href=\"#{name}\">{name}</a><td>{}",
-            escaped(about)
-        )?;
+        let about = about(results, name);
+        write!(page, "\n<tr><td><a href=\"#{name}\">{name}</a><td>{about}")?;
         for method in Method::ALL {
             let is_its =
                 |rows: &&[Row]| rows[0].method == method.name() && rows[0].rate == Some(rate);
@@ -58,11 +53,8 @@ fn matrix(page: &mut String, results: &Results, rate: u32) -> std::fmt::Result {
             if run > 0 {
                 write!(page, "{passed}/{run}")?;
             }
-            let felt = |rows: &&[Row]| {
-                let its = rows.iter().find(|row| row.measure == Measure::JndP95.key());
-                its.map(|row| row.value).filter(|value| !value.is_nan())
-            };
-            if let Some(most) = cells.iter().filter_map(felt).reduce(f64::max) {
+            let errors = cells.iter().filter_map(|rows| felt(rows));
+            if let Some(most) = errors.filter(|felt| !felt.is_nan()).reduce(f64::max) {
                 write!(page, " <small>J {}</small>", brief(most))?;
             }
         }
