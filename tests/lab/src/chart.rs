@@ -193,7 +193,11 @@ fn draw_canonical_head(head: &Area<'_>) -> Drawn {
 }
 
 /// Writes `speed-accuracy.svg`, `tradeoff.svg` and `chart.csv`.
-pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(), Box<dyn Error>> {
+pub(crate) fn write(
+    rows: &[Row],
+    outcomes: &[Outcome],
+    directory: &Path,
+) -> Result<(), Box<dyn Error>> {
     if let Some(picture) = canonical(rows, outcomes)? {
         std::fs::write(directory.join("tradeoff.svg"), picture)?;
     }

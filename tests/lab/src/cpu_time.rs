@@ -3,13 +3,13 @@
 use rustix::time::{ClockId, clock_gettime};
 
 /// CPU time that this thread has used, us.
-pub fn thread_us() -> f64 {
+pub(crate) fn thread_us() -> f64 {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     time.tv_sec as f64 * 1e6 + time.tv_nsec as f64 * 1e-3
 }
 
 /// The value below which the share `share` of the `values` lies (nearest rank); NaN of none.
-pub fn quantile(values: &[f64], share: f64) -> f64 {
+pub(crate) fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     // What is no number is the largest, whatever its sign: computed ones are below all others in `total_cmp`.
     sorted.sort_by(|a, b| a.is_nan().cmp(&b.is_nan()).then(a.total_cmp(b)));

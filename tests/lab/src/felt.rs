@@ -35,16 +35,16 @@ const BELOW: [f64; 2] = [1.0, 2.0];
 
 /// J of every millisecond, and the delay of steps.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Felt {
+pub(crate) struct Felt {
     /// Just-noticeable differences; empty where there is no right answer.
-    pub each: Vec<f64>,
+    pub(crate) each: Vec<f64>,
     /// Largest time between a step of the right answer and the change of force that was matched with it, s.
-    pub step_delay: f64,
+    pub(crate) step_delay: f64,
 }
 
 impl Felt {
     /// Of a run against the right answer. `arm`: radius of the body about its reference point, m.
-    pub fn new(ticks: &[Tick], ideal: &[Vector6], arm: f64) -> Self {
+    pub(crate) fn new(ticks: &[Tick], ideal: &[Vector6], arm: f64) -> Self {
         let forces: Vec<_> = ticks.iter().map(|tick| linear(&tick.wrench)).collect();
         let right: Vec<_> = ideal.iter().map(linear).collect();
         let (steps, step_delay) = steps(&forces, &right);
@@ -61,17 +61,17 @@ impl Felt {
     }
 
     /// 95th percentile; NaN where there is no right answer.
-    pub fn p95(&self) -> f64 {
+    pub(crate) fn p95(&self) -> f64 {
         quantile(&self.each, 0.95)
     }
 
     /// Its largest.
-    pub fn most(&self) -> f64 {
+    pub(crate) fn most(&self) -> f64 {
         quantile(&self.each, 1.0)
     }
 
     /// Share of the time above one just-noticeable difference; NaN where there is no right answer.
-    pub fn share_above_one(&self) -> f64 {
+    pub(crate) fn share_above_one(&self) -> f64 {
         let above = self.each.iter().filter(|j| **j > 1.0 || j.is_nan()).count();
         above as f64 / self.each.len() as f64
     }

@@ -22,7 +22,7 @@ use crate::score::{Case, Score};
 const NAMED_FROM: f64 = 0.5;
 
 /// A case, and what the port takes from its right answer: 95th percentile of J, and the share of the time above 1.
-pub type PortError = (Case, [f64; 2]);
+pub(crate) type PortError = (Case, [f64; 2]);
 
 /// What the port takes from the right answer of each of these recipes.
 pub(crate) fn port_errors(recipes: &[&Recipe]) -> Vec<PortError> {
@@ -34,7 +34,7 @@ pub(crate) fn port_errors(recipes: &[&Recipe]) -> Vec<PortError> {
 }
 
 /// Writes `figures.md`; nothing where no case is common.
-pub fn write(
+pub(crate) fn write(
     scores: &[Score],
     outcomes: &[Outcome],
     port: &[PortError],

@@ -8,7 +8,7 @@
 //! | e_tau  | [`Measure::TorqueP95`]    | N m   | norm of the difference of torques                                  |
 //! | dF     | [`Measure::Step`]         | N     | largest change of F in a millisecond                               |
 //! | E_inj  | [`Measure::Energy`]       | J     | most that the hand has got out, hold of the samples left out        |
-//! | J      | [`Measure::JndP95`]       | –     | 95th percentile over milliseconds of the error that is felt: [`Felt`] |
+//! | J      | [`Measure::JndP95`]       | –     | 95th percentile over milliseconds of the error that is felt: `Felt` |
 //! | J1     | [`Measure::Felt`]         | –     | its first version: the largest of the 95th percentiles and any step  |
 //!
 //! Thresholds: 18.4 degrees for direction (Barbagli et al. 2006), 7 % for magnitude (Pang, Tan, Durlach 1991), 12.7 % for torque at 60 mN m

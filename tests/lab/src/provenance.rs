@@ -15,12 +15,12 @@ const CRATES: [&str; 5] = [
 ];
 
 /// The model of the first processor, as Linux names it.
-pub fn processor() -> String {
+pub(crate) fn processor() -> String {
     value_of("/proc/cpuinfo", "model name")
 }
 
 /// Names and values, in the order in which they are shown.
-pub fn all() -> Vec<(&'static str, String)> {
+pub(crate) fn all() -> Vec<(&'static str, String)> {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     let kernel = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
     let build = if cfg!(debug_assertions) {

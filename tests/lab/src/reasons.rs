@@ -25,7 +25,7 @@ const GAP: i32 = 30;
 const OWN_COLUMN: usize = 3;
 
 /// Writes `reasons.svg` and `reasons.csv`.
-pub fn write(scores: &[Score], directory: &Path) -> Result<(), Box<dyn Error>> {
+pub(crate) fn write(scores: &[Score], directory: &Path) -> Result<(), Box<dyn Error>> {
     if scores.is_empty() {
         return Ok(());
     }

@@ -79,7 +79,7 @@ pub enum Ideal {
     Closed(Box<dyn Fn(f64) -> Vector6 + Send + Sync>),
     /// A table of the independent [`crate::oracle`]'s.
     Oracle,
-    /// A run of this project's method with fine steps, which says how far it is from its own limit: see [`mod@reference`].
+    /// A run of this project's method with fine steps, which says how far it is from its own limit: see `reference`.
     Reference,
     /// None: the recipe is judged by what must hold of any answer.
     None,

@@ -21,9 +21,9 @@ use crate::store;
 /// Steps a tick, each twice the last.
 const STEPS: [u32; 4] = [5, 10, 20, 40];
 /// A tenth of what is felt: of 0.1 N, and of 12.7 % of 60 mN m.
-pub const FORCE_ERROR: f64 = 0.01;
+pub(crate) const FORCE_ERROR: f64 = 0.01;
 /// N m.
-pub const TORQUE_ERROR: f64 = 7.6e-4;
+pub(crate) const TORQUE_ERROR: f64 = 7.6e-4;
 /// How much nearer to the surface than the method the reference rests.
 const NEARER: f64 = 0.1;
 /// Sub-steps of a step, at most.
@@ -90,7 +90,7 @@ impl Answer {
 }
 
 /// Where answers are cached: `target/lab/references`.
-pub fn directory() -> PathBuf {
+fn directory() -> PathBuf {
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../target"),
         PathBuf::from,

@@ -62,7 +62,7 @@ pub struct Results {
     /// Points of each sweep.
     pub sweeps: Vec<(Sweep, Vec<Point>)>,
     /// Points of the stability maps.
-    pub maps: Vec<maps::Point>,
+    pub(crate) maps: Vec<maps::Point>,
     /// What the port takes from the right answer of each recipe.
     pub port: Vec<figures::PortError>,
     /// Forces over time in some recipes.

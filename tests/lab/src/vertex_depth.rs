@@ -5,13 +5,13 @@ use nalgebra::{Point3, Vector3};
 
 /// A convex solid: where `normal . x <= offset` for every plane, world frame, m.
 #[derive(Clone, Debug)]
-pub struct Convex {
+pub(crate) struct Convex {
     planes: Vec<(Vector3<f64>, f64)>,
 }
 
 impl Convex {
     /// A box along the axes between two corners.
-    pub fn cuboid(low: Point3<f64>, high: Point3<f64>) -> Self {
+    pub(crate) fn cuboid(low: Point3<f64>, high: Point3<f64>) -> Self {
         let planes = (0..3).flat_map(|axis| {
             let unit = Vector3::from_fn(|row, _| f64::from(u8::from(row == axis)));
             [(unit, high[axis]), (-unit, -low[axis])]
@@ -22,7 +22,7 @@ impl Convex {
     }
 
     /// How far a point is from the nearest plane, from inside; 0 outside.
-    pub fn depth(&self, point: &Point3<f64>) -> f64 {
+    pub(crate) fn depth(&self, point: &Point3<f64>) -> f64 {
         self.planes
             .iter()
             .map(|(normal, offset)| offset - normal.dot(&point.coords))
@@ -31,7 +31,7 @@ impl Convex {
     }
 
     /// The deepest vertex of a mesh at a pose.
-    pub fn deepest(&self, mesh: &Mesh, world_from_body: &Pose) -> f64 {
+    pub(crate) fn deepest(&self, mesh: &Mesh, world_from_body: &Pose) -> f64 {
         mesh.vertices()
             .iter()
             .map(|vertex| self.depth(&(world_from_body * vertex)))

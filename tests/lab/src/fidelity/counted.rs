@@ -7,20 +7,20 @@ use crate::method::{HapticMethod, Scene};
 
 /// Simulation, coupling, and what the updates did.
 #[derive(Debug)]
-pub struct Counted {
+pub(crate) struct Counted {
     simulation: GodObject,
     coupling: Coupling,
     published: ConstraintSet,
     shaded: Option<ShadedAcceleration>,
     moves: bool,
     /// Of all updates so far.
-    pub work: Work,
+    pub(crate) work: Work,
 }
 
 impl Counted {
     /// At the scene's start, which has to be free, with the set of an update there: a session has run before
     /// its hand goes.
-    pub fn new(scene: &Scene, device: &Pose) -> Self {
+    pub(crate) fn new(scene: &Scene, device: &Pose) -> Self {
         let mut simulation = GodObject::new(scene.world.clone(), scene.settings, scene.start)
             .unwrap_or_else(|error| panic!("{error}"));
         let _ = simulation.step(device, None);

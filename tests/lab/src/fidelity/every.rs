@@ -39,7 +39,7 @@ fn ratio(judged: &Swept) -> Option<f64> {
 }
 
 /// Recipes and shipped scenes of these names, or all.
-pub fn run(names: &[String]) -> Result<Vec<Swept>, SceneError> {
+pub(crate) fn run(names: &[String]) -> Result<Vec<Swept>, SceneError> {
     let mut cases = all(Extent::Quick);
     cases.retain(|recipe| !matches!(recipe.ideal, Ideal::None));
     cases.extend(shipped()?);
@@ -169,7 +169,7 @@ fn along_its_path(name: &'static str, built: &BuiltScene) -> Option<Recipe> {
 }
 
 /// CSV of every setting of every case.
-pub fn csv(judged: &[Swept]) -> String {
+pub(crate) fn csv(judged: &[Swept]) -> String {
     let mut text =
         "case,rate_hz,rounds,chosen,predicted_j,j,j_p95,j_p99,j_first,cost_us_per_s\n".to_owned();
     for case in judged {
@@ -198,7 +198,7 @@ pub fn csv(judged: &[Swept]) -> String {
 }
 
 /// A table of Markdown, with how many are within the budget and how dear they are in the median.
-pub fn table(judged: &[Swept]) -> String {
+pub(crate) fn table(judged: &[Swept]) -> String {
     let mut text = markdown("case", judged, ratio);
     let ratios: Vec<f64> = judged.iter().filter_map(ratio).collect();
     let count = |of: fn(&Swept) -> bool| judged.iter().filter(|case| of(case)).count();

@@ -4,20 +4,20 @@
 //! `fidelity_choice.csv` (the choice of each scene beside the cheapest that a sweep finds).
 //!
 //! - [`scenes`]: scenes of different need, as files say them, with the motion of the hand and the right answer.
-//! - [`seen`]: twelve scenes that were held out from the first choice, and have been seen.
+//! - `seen`: twelve scenes that were held out from the first choice, and have been seen.
 //! - [`held_out`]: twelve scenes of which choice and methods were foretold before they were run.
-//! - [`every`]: every recipe with a right answer, and the scenes that are shipped.
-//! - [`counted`]: the method with its work counted: the cost depends on no clock.
+//! - `every`: every recipe with a right answer, and the scenes that are shipped.
+//! - `counted`: the method with its work counted: the cost depends on no clock.
 //! - [`sweep`]: every setting run, and the verdict.
-//! - [`picture`]: the choice of each scene among all settings, drawn.
+//! - `picture`: the choice of each scene among all settings, drawn.
 //! - [`command`]: the command; [`tables`]: its tables and files.
 
 pub mod command;
-pub mod counted;
-pub mod every;
+mod counted;
+mod every;
 pub mod held_out;
-pub mod picture;
+mod picture;
 pub mod scenes;
-pub mod seen;
+mod seen;
 pub mod sweep;
 pub mod tables;

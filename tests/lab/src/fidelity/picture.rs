@@ -28,7 +28,7 @@ fn ends(swept: &[Swept]) -> [f64; 2] {
 }
 
 /// The picture as a text; a row for each scene.
-pub fn svg(swept: &[Swept]) -> Result<String, Box<dyn Error>> {
+pub(crate) fn svg(swept: &[Swept]) -> Result<String, Box<dyn Error>> {
     let height = HEAD + FOOT + LINE * swept.len() as i32;
     plot::svg((WIDTH as u32, height as u32), |root| {
         root.fill(&WHITE)?;

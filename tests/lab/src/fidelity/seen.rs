@@ -29,7 +29,7 @@ fn around(radius: f64, depth: f64, speed: f64) -> impl Fn(f64) -> Pose + Send + 
 }
 
 /// All of them; their files are written into `directory`.
-pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
+pub(crate) fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
     let egg = taut_scene::write_ply(&egg(0.03, 5, 0.6));
     fs::write(directory.join("egg.ply"), egg)?;
     let lift =

@@ -1,6 +1,6 @@
 //! Every setting of the grid, run and measured, and the verdict on the scene's own choice.
 //!
-//! Error: J of [`felt`](crate::felt), the worst of the start phases: its 95th percentile, or half of its 99th where that is more, so that half a
+//! Error: J of `felt`, the worst of the start phases: its 95th percentile, or half of its 99th where that is more, so that half a
 //! just-noticeable difference is the two lines of the laboratory at once. Cost: nominal microseconds of the god-object loop a second, counted and so the
 //! same on every machine of a type.
 

@@ -7,22 +7,22 @@ const COULOMB: f64 = 0.02;
 
 /// What is set.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Conditions {
+pub(crate) struct Conditions {
     /// What holds the ball or the peg.
-    pub contact: Contact,
+    pub(crate) contact: Contact,
     /// t_d, s.
-    pub delay: f64,
+    pub(crate) delay: f64,
     /// f, Hz.
-    pub updates: u32,
+    pub(crate) updates: u32,
     /// Share of the way to the device that a god-object covers in an update, where it is not the method's
     /// own.
-    pub k_s: Option<f64>,
+    pub(crate) k_s: Option<f64>,
     /// b, N s/m.
-    pub damping: f64,
+    pub(crate) damping: f64,
     /// f_c, N.
-    pub coulomb: f64,
+    pub(crate) coulomb: f64,
     /// Delta, m; 0 is none.
-    pub resolution: f64,
+    pub(crate) resolution: f64,
 }
 
 pub(super) const STANDARD: Conditions = Conditions {
@@ -46,11 +46,11 @@ pub(super) fn updated(contact: Contact, hz: f64) -> Conditions {
 
 /// One map.
 #[derive(Clone, Copy, Debug)]
-pub struct Map {
+pub(crate) struct Map {
     /// Name in files.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// What is swept, with its unit.
-    pub axis: &'static str,
+    pub(crate) axis: &'static str,
     /// Where.
     pub(super) values: &'static [f64],
     pub(super) at: fn(f64) -> Conditions,
@@ -60,7 +60,7 @@ pub struct Map {
 const RATES: [f64; 5] = [70.0, 140.0, 300.0, 500.0, 1000.0];
 
 /// All.
-pub const MAPS: [Map; 9] = [
+pub(crate) const MAPS: [Map; 9] = [
     Map {
         name: "delay",
         axis: "delay of the force, ms",

@@ -36,7 +36,7 @@ const LIMIT: f64 = 1e9;
 
 /// What holds the ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Contact {
+pub(crate) enum Contact {
     /// One wall across z.
     Wall,
     /// Two walls, across x and z.

@@ -54,7 +54,7 @@ pub(crate) fn panels(points: &[Point]) -> Result<Vec<String>, Box<dyn Error>> {
 }
 
 /// Writes `stability-methods.csv` and `stability-methods.svg`.
-pub fn write(points: &[Point], directory: &Path) -> Result<(), Box<dyn Error>> {
+pub(crate) fn write(points: &[Point], directory: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(directory)?;
     std::fs::write(directory.join("stability-methods.csv"), csv(points))?;
     let lines = MAPS.len().div_ceil(COLUMNS) as u32;

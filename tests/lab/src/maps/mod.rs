@@ -27,10 +27,8 @@ use taut_control_tests::closed_loop::{PERIOD, critical_stiffness, grip, held};
 use taut_plant::stability::{SampledLoop, linear_limit, passive_limit_quantised};
 use taut_plant::{Encoder, Grip, Hand, Plant};
 
-pub use axes::{Conditions, MAPS, Map};
-pub use contact::Contact;
-pub use files::write;
-pub(crate) use files::{COLOURS, panels};
+use axes::{Conditions, MAPS, Map};
+pub(crate) use files::{COLOURS, panels, write};
 
 use crate::crew;
 use crate::method::{Method, Tuning};
@@ -38,7 +36,7 @@ use crate::recipes::Extent;
 use contact::Pressed;
 
 /// Who is mapped: what differs from them by adaptation or look-ahead differs before a contact, not in it.
-pub const METHODS: [Method; 6] = [
+pub(crate) const METHODS: [Method; 6] = [
     Method::Ours,
     Method::Paper,
     Method::VirtualCoupling,
@@ -62,21 +60,21 @@ const SEARCH_WIDTH: f64 = 0.02;
 
 /// One point of a map: a row of its CSV.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub(crate) struct Point {
     /// Of the map.
-    pub map: &'static str,
+    pub(crate) map: &'static str,
     /// Where on its axis.
-    pub at: f64,
+    pub(crate) at: f64,
     /// Who.
-    pub method: Method,
+    pub(crate) method: Method,
     /// K_crit by simulation, N/m; an end of the search where nothing within it changes.
-    pub critical: f64,
+    pub(crate) critical: f64,
     /// By the eigenvalues of device and spring, N/m.
-    pub by_eigenvalues: f64,
+    pub(crate) by_eigenvalues: f64,
     /// `b / (T/2 + t_d)`, N/m.
-    pub by_rule: f64,
+    pub(crate) by_rule: f64,
     /// The bound of passivity with a count and friction, N/m; NaN where nothing is counted.
-    pub passive: f64,
+    pub(crate) passive: f64,
 }
 
 impl Conditions {
@@ -88,7 +86,7 @@ impl Conditions {
     }
 
     /// Of the sampled loop of device and spring, N/m.
-    pub fn by_eigenvalues(&self) -> f64 {
+    pub(crate) fn by_eigenvalues(&self) -> f64 {
         let loop_of_it = SampledLoop {
             mass: self.device().mass,
             damping: self.damping,
@@ -99,7 +97,7 @@ impl Conditions {
     }
 
     /// `b / (T/2 + t_d)`, N/m.
-    pub fn by_rule(&self) -> f64 {
+    pub(crate) fn by_rule(&self) -> f64 {
         linear_limit(self.damping, 0.0, PERIOD.as_secs_f64(), self.delay)
     }
 
@@ -113,7 +111,7 @@ impl Conditions {
     }
 
     /// K_crit of a method, N/m.
-    pub fn critical(&self, method: Method) -> f64 {
+    pub(crate) fn critical(&self, method: Method) -> f64 {
         critical_stiffness(SEARCH, SEARCH_WIDTH, |k| self.grows(method, k))
     }
 
@@ -187,7 +185,7 @@ impl Conditions {
 }
 
 /// All points of all maps, on so many threads; the quick extent has the ends of each axis alone. Calls `done` after each.
-pub fn run(extent: Extent, threads: usize, done: impl Fn() + Sync) -> Vec<Point> {
+pub(crate) fn run(extent: Extent, threads: usize, done: impl Fn() + Sync) -> Vec<Point> {
     crew::map(threads, &tasks(extent), |(map, at, method)| {
         let conditions = (map.at)(*at);
         let point = Point {
@@ -223,6 +221,7 @@ pub(crate) fn tasks(extent: Extent) -> Vec<(Map, f64, Method)> {
 #[cfg(test)]
 mod tests {
     use super::axes::updated;
+    use super::contact::Contact;
     use super::*;
 
     /// The method of this project is a spring to the wall: its limit is that of the eigenvalues.

@@ -10,7 +10,7 @@ const TORQUE: f64 = 0.05;
 
 /// A body that stays where it started, with a wrench that has nothing to do with the scene.
 #[derive(Debug)]
-pub struct Control {
+pub(crate) struct Control {
     pose: Pose,
     /// State of the generator.
     random: Option<u64>,

@@ -23,7 +23,7 @@ use crate::method::{HapticMethod, Scene};
 
 /// The method's state.
 #[derive(Debug)]
-pub struct Discrete {
+pub(crate) struct Discrete {
     world: Arc<World>,
     settings: Settings,
     /// Of the body about its reference point, m.
@@ -43,7 +43,7 @@ pub struct Discrete {
 
 impl Discrete {
     /// At the scene's start, with these settings but for the adaptation of constraints.
-    pub fn new(scene: &Scene, settings: &Settings) -> Self {
+    pub(crate) fn new(scene: &Scene, settings: &Settings) -> Self {
         let settings = Settings {
             adaptation: None,
             ..*settings

@@ -6,7 +6,7 @@ use crate::method::{HapticMethod, Scene};
 
 /// Simulation and coupling, and the constraint set between them.
 #[derive(Debug)]
-pub struct GodObjectMethod {
+pub(crate) struct GodObjectMethod {
     simulation: GodObject,
     coupling: Coupling,
     published: ConstraintSet,
@@ -15,7 +15,7 @@ pub struct GodObjectMethod {
 
 impl GodObjectMethod {
     /// At the scene's start, which has to be free.
-    pub fn new(scene: &Scene, settings: &Settings) -> Self {
+    pub(crate) fn new(scene: &Scene, settings: &Settings) -> Self {
         let simulation = GodObject::new(scene.world.clone(), *settings, scene.start)
             .unwrap_or_else(|error| panic!("{error}"));
         Self {

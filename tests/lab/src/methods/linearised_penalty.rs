@@ -55,7 +55,7 @@ struct LinearWrench {
 
 /// The method's state.
 #[derive(Debug)]
-pub struct LinearisedPenalty {
+pub(crate) struct LinearisedPenalty {
     world: Arc<World>,
     settings: Settings,
     share: f64,
@@ -83,7 +83,7 @@ pub struct LinearisedPenalty {
 
 impl LinearisedPenalty {
     /// At the scene's start. A tuning that is not of this method is its first one.
-    pub fn new(scene: &Scene, tuning: Tuning) -> Self {
+    pub(crate) fn new(scene: &Scene, tuning: Tuning) -> Self {
         let Tuning::Tool {
             share,
             damping_ratio,

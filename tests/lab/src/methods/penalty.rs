@@ -46,7 +46,7 @@ struct Found {
 
 /// The method's state.
 #[derive(Debug)]
-pub struct Penalty {
+pub(crate) struct Penalty {
     world: Arc<World>,
     settings: Settings,
     stiffness: f64,

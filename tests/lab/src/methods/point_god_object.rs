@@ -37,7 +37,7 @@ struct Held {
 
 /// The method's state.
 #[derive(Debug)]
-pub struct PointGodObject {
+pub(crate) struct PointGodObject {
     world: Arc<World>,
     settings: Settings,
     stiffness: f64,

@@ -38,7 +38,7 @@ struct Found {
 
 /// The method's state.
 #[derive(Debug)]
-pub struct StaticCoupling {
+pub(crate) struct StaticCoupling {
     world: Arc<World>,
     settings: Settings,
     /// Of a contact, N/m.
@@ -59,7 +59,7 @@ pub struct StaticCoupling {
 
 impl StaticCoupling {
     /// At the scene's start. A tuning that is not of this method is its first one.
-    pub fn new(scene: &Scene, tuning: Tuning) -> Self {
+    pub(crate) fn new(scene: &Scene, tuning: Tuning) -> Self {
         let Tuning::Static {
             points,
             stiffness,

@@ -53,7 +53,7 @@ impl Problem {
 
 /// The method's state.
 #[derive(Debug)]
-pub struct TwoRateLcp {
+pub(crate) struct TwoRateLcp {
     world: Arc<World>,
     settings: Settings,
     contact_distance: f64,
@@ -74,7 +74,7 @@ pub struct TwoRateLcp {
 
 impl TwoRateLcp {
     /// At the scene's start. A tuning that is not of this method is its first one.
-    pub fn new(scene: &Scene, tuning: Tuning) -> Self {
+    pub(crate) fn new(scene: &Scene, tuning: Tuning) -> Self {
         let Tuning::Proximity { contact, alarm } = tuning else {
             return Self::new(scene, Method::TwoRateLcp.tunings()[0]);
         };

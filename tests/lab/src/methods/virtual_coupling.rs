@@ -42,7 +42,7 @@ struct Proxy {
 
 /// The method's state.
 #[derive(Debug)]
-pub struct VirtualCoupling {
+pub(crate) struct VirtualCoupling {
     world: Arc<World>,
     settings: Settings,
     period: f64,
