@@ -21,7 +21,6 @@ use super::contacts::{
 };
 use crate::method::{HapticMethod, Scene};
 
-/// The method's state.
 #[derive(Debug)]
 pub(crate) struct Discrete {
     world: Arc<World>,

@@ -53,7 +53,6 @@ struct LinearWrench {
     matrix: Matrix6<f64>,
 }
 
-/// The method's state.
 #[derive(Debug)]
 pub(crate) struct LinearisedPenalty {
     world: Arc<World>,

@@ -44,7 +44,6 @@ struct Found {
     near: Vec<Near>,
 }
 
-/// The method's state.
 #[derive(Debug)]
 pub(crate) struct Penalty {
     world: Arc<World>,

@@ -35,7 +35,6 @@ struct Held {
     planes: Vec<HalfSpace>,
 }
 
-/// The method's state.
 #[derive(Debug)]
 pub(crate) struct PointGodObject {
     world: Arc<World>,

@@ -36,7 +36,6 @@ struct Found {
     planes: Vec<TangentPlane>,
 }
 
-/// The method's state.
 #[derive(Debug)]
 pub(crate) struct StaticCoupling {
     world: Arc<World>,

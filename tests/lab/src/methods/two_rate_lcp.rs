@@ -51,7 +51,6 @@ impl Problem {
     }
 }
 
-/// The method's state.
 #[derive(Debug)]
 pub(crate) struct TwoRateLcp {
     world: Arc<World>,

@@ -40,7 +40,6 @@ struct Proxy {
     contacts: Vec<Contact>,
 }
 
-/// The method's state.
 #[derive(Debug)]
 pub(crate) struct VirtualCoupling {
     world: Arc<World>,
