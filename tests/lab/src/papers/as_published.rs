@@ -1,6 +1,6 @@
 //! Ortega et al. 2007: no penetration, nothing along a hole or a plane, times, and constraints that rise.
 
-use super::{Figure, TINY};
+use super::{Figure, TINY, figure};
 use crate::clock::{self, Charge, TICK, Tick};
 use crate::costs;
 use crate::cpu_time::quantile;
@@ -21,7 +21,8 @@ const SPEED: f64 = 0.2;
 /// Most that may act along a hole, N.
 const AXIAL_FORCE: f64 = 1e-6;
 
-fn figure(
+/// Of the paper's method, where no more than `most` is published.
+fn at_most(
     of: &str,
     source: &'static str,
     published: &str,
@@ -29,15 +30,14 @@ fn figure(
     most: f64,
     unit: &'static str,
 ) -> Figure {
-    Figure {
-        method: Method::Paper,
-        of: of.to_owned(),
-        source,
-        published: published.to_owned(),
+    figure(
+        (Method::Paper, source),
+        of,
+        published,
         here,
-        within: [0.0, most],
+        [0.0, most],
         unit,
-    }
+    )
 }
 
 /// `peg`: in its hole, as in the paper's figure 11; `plane`: its figure 13.
@@ -47,7 +47,7 @@ pub(super) fn figures(peg: &Recipe, plane: &Recipe) -> Vec<Figure> {
     let cost = costs::of(peg, Method::Paper, in_hole.tuning, RATE);
     let [update, force] = cost.map_or([f64::NAN; 2], |cost| [1e-3 * cost.update[2], cost.force]);
     vec![
-        figure(
+        at_most(
             "poses at which peg (288 triangles) and box meet, R18",
             "Ortega et al. 2007, section 4",
             "none",
@@ -55,7 +55,7 @@ pub(super) fn figures(peg: &Recipe, plane: &Recipe) -> Vec<Figure> {
             0.0,
             "",
         ),
-        figure(
+        at_most(
             "force along the hole while the peg is pushed about in it, R18",
             "the same, figure 11",
             "0 N",
@@ -63,7 +63,7 @@ pub(super) fn figures(peg: &Recipe, plane: &Recipe) -> Vec<Figure> {
             AXIAL_FORCE,
             "N",
         ),
-        figure(
+        at_most(
             "force along a plane over that across it, R02",
             "the same, figure 13",
             "0",
@@ -71,7 +71,7 @@ pub(super) fn figures(peg: &Recipe, plane: &Recipe) -> Vec<Figure> {
             TINY,
             "",
         ),
-        figure(
+        at_most(
             "a force in the hole, median of costs.csv",
             "the same, on a computer of 2006",
             "below 25 us",
@@ -79,7 +79,7 @@ pub(super) fn figures(peg: &Recipe, plane: &Recipe) -> Vec<Figure> {
             25.0,
             "us",
         ),
-        figure(
+        at_most(
             "an update in the hole, 99th percentile of costs.csv",
             "the same, on a computer of 2006",
             "below 10 ms",
@@ -100,7 +100,7 @@ pub(super) fn bunnies(bunnies: &Recipe) -> Vec<Figure> {
     let checked = run.ticks.iter().step_by(bunnies.check_every as usize);
     let source = "the same, on a computer of 2006";
     vec![
-        figure(
+        at_most(
             "poses at which two bunnies of 27,000 triangles meet, R27",
             "Ortega et al. 2007, section 4",
             "none",
@@ -108,7 +108,7 @@ pub(super) fn bunnies(bunnies: &Recipe) -> Vec<Figure> {
             0.0,
             "",
         ),
-        figure(
+        at_most(
             "a force there, median",
             source,
             "below 12.5 us",
@@ -116,7 +116,7 @@ pub(super) fn bunnies(bunnies: &Recipe) -> Vec<Figure> {
             12.5,
             "us",
         ),
-        figure(
+        at_most(
             "an update there, 99th percentile",
             source,
             "below 15 ms",
@@ -135,15 +135,14 @@ pub(super) fn behind(cylinder: &Recipe) -> Figure {
     let measured = Measured::of(cylinder, RATE, &judged(1), None, start);
     let share = PUBLISHED_SHARE * (1.0 - DEEP / RADIUS);
     let behind = ((1.0 / share + 0.5) * SPEED / (RADIUS * f64::from(RATE))).to_degrees();
-    Figure {
-        method: Method::Paper,
-        of: format!("the force's lag on a cylinder of 20 mm, 0.2 m/s, {RATE} Hz, {tuning}, R12"),
-        source: "not published, it follows from the steps",
-        published: format!("{behind:.2} degrees"),
-        here: measured.worst(Measure::DirectionP95),
-        within: [0.98, 1.02].map(|slack| slack * behind),
-        unit: "degrees",
-    }
+    figure(
+        (Method::Paper, "not published, it follows from the steps"),
+        format!("the force's lag on a cylinder of 20 mm, 0.2 m/s, {RATE} Hz, {tuning}, R12"),
+        format!("{behind:.2} degrees"),
+        measured.worst(Measure::DirectionP95),
+        [0.98, 1.02].map(|slack| slack * behind),
+        "degrees",
+    )
 }
 
 /// A constraint that is d behind when it is found rises over a time, so that the force does not jump.
@@ -155,16 +154,18 @@ pub(super) fn adapted(late: &Recipe) -> Figure {
     let depth = measured.worst(Measure::FirstForceDepth);
     let rising = depth / adaptation.duration + late.scene.speed;
     let most = late.scene.stiffness() * rising * TICK;
-    Figure {
-        method: Method::PaperAdapted,
-        of: format!(
+    figure(
+        (
+            Method::PaperAdapted,
+            "Ortega et al. 2007, section 5, figure 6",
+        ),
+        format!(
             "largest step of the force, wall found {:.1} mm late at {SLOW_RATE} Hz, R11",
             1e3 * depth
         ),
-        source: "Ortega et al. 2007, section 5, figure 6",
-        published: format!("at most {most:.3} N/ms, by the time of rising"),
-        here: measured.worst(Measure::Step),
-        within: [0.0, most * (1.0 + TINY)],
-        unit: "N/ms",
-    }
+        format!("at most {most:.3} N/ms, by the time of rising"),
+        measured.worst(Measure::Step),
+        [0.0, most * (1.0 + TINY)],
+        "N/ms",
+    )
 }

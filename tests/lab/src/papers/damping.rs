@@ -34,6 +34,33 @@ pub(super) fn of_spring() -> f64 {
     0.5 * wall().stiffness() * TICK
 }
 
+/// The most of [`needed`] over K T / 2 + B, of every tuning of a method with a damped body, over swings of these ticks.
+pub(super) fn most_over_bound(method: Method, depth: f64, swings: &[u32]) -> f64 {
+    let scene = wall();
+    let over_bound = |tuning: Tuning| {
+        let (Tuning::Proxy {
+            share,
+            damping_ratio,
+            ..
+        }
+        | Tuning::Tool {
+            share,
+            damping_ratio,
+            ..
+        }) = tuning
+        else {
+            panic!("{tuning}: no damped body")
+        };
+        let inertia = share * scene.world.body.mass;
+        let damper = 2.0 * damping_ratio * (scene.stiffness() * inertia).sqrt();
+        let bound = of_spring() + damper;
+        let over = move |swing: &u32| needed(method, tuning, depth, *swing) / bound;
+        swings.iter().map(over).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let each = method.tunings().into_iter().map(over_bound);
+    each.fold(f64::NEG_INFINITY, f64::max)
+}
+
 /// The damping, N s/m, that takes as much as comes out of a method. The device swings about a depth in the wall, m, once in so many ticks, at
 /// constant speed between samples: of all motions with these samples the one that a damper takes least of.
 pub(super) fn needed(method: Method, tuning: Tuning, depth: f64, swing: u32) -> f64 {
@@ -48,7 +75,9 @@ pub(super) fn needed(method: Method, tuning: Tuning, depth: f64, swing: u32) -> 
         HALF - down + swung
     };
     let mut method = method.start(&wall(), TICK, tuning);
-    let run = driven(method.as_mut(), SETTLED + SWINGS, |tick| at(height(tick)));
+    let run = driven(method.as_mut(), (SETTLED + SWINGS, 1), |tick| {
+        at(height(tick))
+    });
     let (mut given, mut taken) = (0.0, 0.0);
     for tick in SETTLED + SWINGS / 2..SETTLED + SWINGS {
         let way = height(tick + 1) - height(tick);

@@ -3,7 +3,7 @@
 
 use god_object::spatial::linear;
 
-use super::{Figure, HALF, at, damping};
+use super::{Figure, HALF, at, damping, driven, figure};
 use crate::clock::TICK;
 use crate::method::{Method, Scene};
 use crate::recipes::{cube, ground};
@@ -29,33 +29,13 @@ pub(super) fn figures() -> Vec<Figure> {
         stiffness: RATIO,
         contacts,
     };
-    let most = |depth: f64| {
-        let tunings = Method::LinearisedPenalty.tunings();
-        let each = tunings.into_iter().flat_map(|tuning| {
-            let needed =
-                move |swing| damping::needed(Method::LinearisedPenalty, tuning, depth, swing);
-            SWINGS.map(move |swing| needed(swing) / bound(tuning))
-        });
-        each.fold(f64::NEG_INFINITY, f64::max)
-    };
+    let most = |depth| damping::most_over_bound(Method::LinearisedPenalty, depth, &SWINGS);
     let light = tool(LIGHT, 1.0, LinearContacts::Whole);
     let (along, across) = slid(light);
-    let figure = |of: String, published: &str, here: f64, within| Figure {
-        method: Method::LinearisedPenalty,
-        of,
-        source: "Otaduy and Lin 2006",
-        published: published.to_owned(),
-        here,
-        within,
-        unit: "",
-    };
-    let passive = |of: &str, here| {
-        figure(
-            of.to_owned(),
-            "passive: at most 1",
-            here,
-            [f64::NEG_INFINITY, 1.0 + 1e-6],
-        )
+    let source = (Method::LinearisedPenalty, "Otaduy and Lin 2006");
+    let passive = |of, here| {
+        let within = [f64::NEG_INFINITY, 1.0 + 1e-6];
+        figure(source, of, "passive: at most 1", here, within, "")
     };
     vec![
         passive(
@@ -64,33 +44,22 @@ pub(super) fn figures() -> Vec<Figure> {
         ),
         passive("the same where nothing is touched", most(-0.02)),
         figure(
-            "error of the force across a plane, a tool of 1 mg that slides on it, contacts every 33 ms".to_owned(),
+            source,
+            "error of the force across a plane, a tool of 1 mg that slides on it, contacts every 33 ms",
             "a small mass is stable: at most the offset of the contacts",
             across,
             [0.0, offset() / DEEP],
+            "",
         ),
         figure(
-            "force along it over that across it: the tool moves between updates".to_owned(),
+            source,
+            "force along it over that across it: the tool moves between updates",
             "0 but for the damper's lag",
             along,
             [0.0, 1e-2],
+            "",
         ),
     ]
-}
-
-/// K T / 2 + B of a tuning, N s/m.
-fn bound(tuning: Tuning) -> f64 {
-    let Tuning::Tool {
-        share,
-        damping_ratio,
-        ..
-    } = tuning
-    else {
-        panic!("{tuning}: not of linearised penalty")
-    };
-    let scene = damping::wall();
-    let inertia = share * scene.world.body.mass;
-    damping::of_spring() + 2.0 * damping_ratio * (scene.stiffness() * inertia).sqrt()
 }
 
 /// Gap at which a contact begins to push, m.
@@ -105,21 +74,17 @@ fn slid(tuning: Tuning) -> (f64, f64) {
     let scene = Scene::new(cube(HALF), [ground()], 2.0 * HALF, SPEED, at(HALF + 1e-4));
     let period = f64::from(SELDOM) * TICK;
     let mut method = Method::LinearisedPenalty.start(&scene, period, tuning);
-    let (mut along, mut error) = (0.0_f64, 0.0_f64);
-    for tick in 0..TICKS {
-        let time = f64::from(tick) * TICK;
+    let run = driven(method.as_mut(), (TICKS, SELDOM), |tick| {
         let down = (2.0 * f64::from(tick) / f64::from(TICKS)).min(1.0);
         let mut device = at(HALF + 1e-4 - down * (DEEP + 1e-4));
-        device.translation.x = SPEED * time;
-        if tick % SELDOM == 0 {
-            method.update(time, &device);
-            method.publish(time);
-        }
-        let force = linear(&method.force(time, &device));
-        if tick >= TICKS / 2 + SELDOM {
-            along = along.max(force.xy().norm() / force.z);
-            error = error.max((force.z / (DEEP * scene.stiffness()) - 1.0).abs());
-        }
+        device.translation.x = SPEED * (f64::from(tick) * TICK);
+        device
+    });
+    let (mut along, mut error) = (0.0_f64, 0.0_f64);
+    for (_, wrench) in &run[(TICKS / 2 + SELDOM) as usize..] {
+        let force = linear(wrench);
+        along = along.max(force.xy().norm() / force.z);
+        error = error.max((force.z / (DEEP * scene.stiffness()) - 1.0).abs());
     }
     (along, error)
 }

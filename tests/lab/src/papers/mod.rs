@@ -133,17 +133,39 @@ pub fn table(figures: &[Figure]) -> String {
     table
 }
 
-/// Poses and forces of a method in a loop with time to spare. `device`: its pose at a tick.
+/// What an opponent comes to of what somebody says of it.
+fn figure(
+    (method, source): (Method, &'static str),
+    of: impl Into<String>,
+    published: impl Into<String>,
+    here: f64,
+    within: [f64; 2],
+    unit: &'static str,
+) -> Figure {
+    Figure {
+        method,
+        of: of.into(),
+        source,
+        published: published.into(),
+        here,
+        within,
+        unit,
+    }
+}
+
+/// Poses and forces of a method in a loop with time to spare, updated every so many ticks. `device`: its pose at a tick.
 fn driven(
     method: &mut dyn HapticMethod,
-    ticks: u32,
+    (ticks, every): (u32, u32),
     device: impl Fn(u32) -> Pose,
 ) -> Vec<(Pose, Vector6)> {
     let step = |tick: u32| {
         let time = f64::from(tick) * TICK;
         let pose = device(tick);
-        method.update(time, &pose);
-        method.publish(time);
+        if tick % every == 0 {
+            method.update(time, &pose);
+            method.publish(time);
+        }
         let force = method.force(time, &pose);
         (method.pose(), force)
     };

@@ -1,6 +1,6 @@
 //! What holds of any penalty method: a force of so much for a depth, out of the nearest surface, and the bound of its spring.
 
-use super::{Figure, HALF, TINY, at, damping, driven};
+use super::{Figure, HALF, TINY, at, damping, driven, figure};
 use crate::clock::TICK;
 use crate::method::{Method, Scene};
 use crate::recipes::{block, cube};
@@ -21,7 +21,7 @@ pub(super) fn figures() -> Vec<Figure> {
     let tuning = Method::Penalty.tunings()[1];
     let depth = |tick: u32| STEP * (f64::from(tick) + 0.5);
     let mut method = Method::Penalty.start(&scene, TICK, tuning);
-    let run = driven(method.as_mut(), STEPS, |tick| at(HALF - depth(tick)));
+    let run = driven(method.as_mut(), (STEPS, 1), |tick| at(HALF - depth(tick)));
     let forces = || {
         (0..)
             .zip(&run)
@@ -30,36 +30,27 @@ pub(super) fn figures() -> Vec<Figure> {
     let through = forces().find(|(_, force)| *force < 0.0);
     let near = forces().filter(|(depth, _)| *depth < 0.5 * thickness);
     let errors = near.map(|(depth, force)| (force / (depth * scene.stiffness()) - 1.0).abs());
-    let figure = |of: &str, source, published: String, here: f64, within, unit| Figure {
-        method: Method::Penalty,
-        of: of.to_owned(),
-        source,
-        published,
-        here,
-        within,
-        unit,
-    };
     let bound = damping::of_spring();
     vec![
         figure(
+            (Method::Penalty, "any penalty method"),
             "error of force over stiffness times depth, on a face",
-            "any penalty method",
-            "0".to_owned(),
+            "0",
             errors.fold(0.0, f64::max),
             [0.0, TINY],
             "",
         ),
         figure(
+            (Method::Penalty, "any without history"),
             "depth at which a plate lets it through, over its thickness",
-            "any without history",
-            "0.5".to_owned(),
+            "0.5",
             through.map_or(f64::NAN, |(depth, _)| depth / thickness),
             [0.499, 0.501],
             "",
         ),
         figure(
+            (Method::Penalty, "Colgate and Schenkel 1997"),
             "damping of a device that its wall is passive on, K T / 2",
-            "Colgate and Schenkel 1997",
             format!("{bound:.3} N s/m"),
             damping::needed(Method::Penalty, tuning, HALF, 2),
             [bound - 1e-6, bound + 1e-6],

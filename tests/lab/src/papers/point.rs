@@ -3,7 +3,7 @@
 use god_object::Pose;
 use nalgebra::Vector3;
 
-use super::{Figure, HALF, TINY, driven};
+use super::{Figure, HALF, TINY, driven, figure};
 use crate::clock::TICK;
 use crate::costs;
 use crate::method::{Method, Scene};
@@ -22,26 +22,19 @@ pub(super) fn figures(plate: &Recipe) -> Vec<Figure> {
     let errors = (0..PLACES).map(|_| {
         let device = Vector3::from_fn(|_, _| 0.03 * costs::uniform(&mut state) - 0.01);
         let pose = Pose::from_parts(device.into(), nalgebra::UnitQuaternion::identity());
-        let found = driven(start(&scene).as_mut(), UPDATES, |_| pose);
+        let found = driven(start(&scene).as_mut(), (UPDATES, 1), |_| pose);
         let found = found[found.len() - 1].0.translation.vector;
         (found - device.map(|x| x.max(HALF))).amax()
     });
     let worst = errors.fold(0.0, f64::max);
     let time = |tick: u32| f64::from(tick) * TICK;
-    let run = driven(start(&plate.scene).as_mut(), plate.ticks(), |tick| {
+    let run = driven(start(&plate.scene).as_mut(), (plate.ticks(), 1), |tick| {
         (plate.device)(time(tick))
     });
     let astray = (0..).zip(&run);
     let astray = astray.map(|(tick, (pose, _))| (plate.astray)(time(tick), pose));
-    let figure = |of: &str, here: f64, most: f64| Figure {
-        method: Method::Point,
-        of: of.to_owned(),
-        source: "Zilles and Salisbury 1995",
-        published: "0 m".to_owned(),
-        here,
-        within: [0.0, most],
-        unit: "m",
-    };
+    let source = (Method::Point, "Zilles and Salisbury 1995");
+    let figure = |of, here, most| figure(source, of, "0 m", here, [0.0, most], "m");
     vec![
         figure(
             "way to the point of the surface nearest to the device, on one, two and three planes, 200 places",

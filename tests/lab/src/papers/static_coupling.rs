@@ -1,7 +1,7 @@
 //! Barbic and James 2008: the coupling saturates, so that a device that is far inside presses no deeper than the contacts bear; and a coupling without
 //! damping is a spring.
 
-use super::{Figure, HALF, at, damping, driven};
+use super::{Figure, HALF, at, damping, driven, figure};
 use crate::clock::TICK;
 use crate::method::{Method, Scene};
 use crate::recipes::{block, cube};
@@ -28,24 +28,17 @@ pub(super) fn figures() -> Vec<Figure> {
     let way = HALF + BEYOND;
     let height = |tick: u32| 2.0 * HALF - way * f64::from(tick) / f64::from(STEPS);
     let mut method = Method::StaticCoupling.start(&scene, TICK, AS_PUBLISHED);
-    let run = driven(method.as_mut(), STEPS, |tick| at(height(tick)));
+    let run = driven(method.as_mut(), (STEPS, 1), |tick| at(height(tick)));
     let lowest = run.iter().map(|(pose, _)| pose.translation.z - HALF);
     let lowest = lowest.fold(f64::INFINITY, f64::min);
     let limit = scene.settings.force_limit;
     let contact = RATIO * scene.stiffness();
     let last = run[run.len() - 1].1[2];
-    let figure = |of: &str, published: String, here: f64, within, unit| Figure {
-        method: Method::StaticCoupling,
-        of: of.to_owned(),
-        source: "Barbic and James 2008",
-        published,
-        here,
-        within,
-        unit,
-    };
+    let source = (Method::StaticCoupling, "Barbic and James 2008");
     let bound = damping::of_spring() * RATIO / (1.0 + RATIO);
     vec![
         figure(
+            source,
             "depth in a plate of 0.1 mm, from the offset on, with the device 45 mm beyond it: the coupling saturates",
             format!("at most {:.1e} m", limit / contact),
             limit / contact - lowest,
@@ -53,22 +46,21 @@ pub(super) fn figures() -> Vec<Figure> {
             "m",
         ),
         figure(
+            source,
             "force there",
             format!("{limit} N, where the coupling saturates"),
             last,
             [limit - 1e-6, limit + 1e-6],
             "N",
         ),
-        Figure {
-            source: "Colgate and Schenkel 1997",
-            ..figure(
-                "damping of a device that its wall is passive on, K T / 2 of both springs in series",
-                format!("{bound:.4} N s/m"),
-                damping::needed(Method::StaticCoupling, SERIES, HALF, 2),
-                [bound - 1e-6, bound + 1e-6],
-                "N s/m",
-            )
-        },
+        figure(
+            (Method::StaticCoupling, "Colgate and Schenkel 1997"),
+            "damping of a device that its wall is passive on, K T / 2 of both springs in series",
+            format!("{bound:.4} N s/m"),
+            damping::needed(Method::StaticCoupling, SERIES, HALF, 2),
+            [bound - 1e-6, bound + 1e-6],
+            "N s/m",
+        ),
     ]
 }
 
