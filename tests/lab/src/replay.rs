@@ -17,12 +17,11 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use god_object::spatial::{angular, linear};
-use god_object::{Body, Pose, Settings, Vector6, World};
+use god_object::{Body, Pose, Settings, Vector6};
 use nalgebra::{Matrix3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use taut_method_tests::solids::{mesh, obstacle};
+use taut_method_tests::solids::{mesh, obstacle, world};
 use taut_scene::read_mesh;
 
 use crate::clock::{self, Charge, TICK};
@@ -277,10 +276,7 @@ fn recipe(
         reference_point: Point3::origin(),
         mesh: read(format!("rollers_{tool}.ply"))?,
     };
-    let world = World {
-        body,
-        obstacles: vec![obstacle("contour", read("contour.ply".into())?, contour)],
-    };
+    let contour = obstacle("contour", read("contour.ply".into())?, contour);
     // Deep enough for the spring to carry the wrench.
     let pushed = |sample: &Sample| {
         let way = -linear(&sample.wrench) / stiffness;
@@ -319,7 +315,7 @@ fn recipe(
     settings.force_limit = NO_LIMIT;
     settings.torque_limit = NO_LIMIT;
     let scene = Scene {
-        world: Arc::new(world),
+        world: world(body, [contour]),
         start,
         settings,
         speed: 0.5,

@@ -2,8 +2,41 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Point3, Rotation2, Vector2};
+use god_object::{Body, Obstacle, Pose};
+use nalgebra::{Point3, Rotation2, Translation3, UnitQuaternion, Vector2, Vector3};
 use taut_scene::RawMesh;
+
+use crate::solids::{body, cells, mesh, obstacle};
+
+/// Pitch, width and depth of the teeth of [`combs`], and thickness of the bars that they stand on, m.
+const COMB_PITCH: f64 = 4e-3;
+const COMB_TOOTH: f64 = 2e-3;
+pub const COMB_DEPTH: f64 = 10e-3;
+const COMB_BAR: f64 = 3e-3;
+
+/// A comb of eleven teeth that point down, and one whose teeth go into the gaps of the other and beyond, so much narrower on each side, m.
+/// Forces act in the middle of the teeth: a push to the side has no lever.
+pub fn combs(clearance: f64) -> (Body, Obstacle) {
+    let planes = |width: f64, teeth: usize| -> Vec<f64> {
+        let first = -0.5 * (teeth - 1) as f64 * COMB_PITCH;
+        (0..teeth)
+            .flat_map(|k| {
+                let middle = first + k as f64 * COMB_PITCH;
+                [middle - 0.5 * width, middle + 0.5 * width]
+            })
+            .collect()
+    };
+    let y = [-5e-3, 5e-3];
+    let upper_x = planes(COMB_TOOTH, 11);
+    let upper = [&upper_x, &y[..], &[-COMB_DEPTH, 0.0, COMB_BAR]];
+    let upper = cells(upper, |[i, _, k]| k == 1 || i % 2 == 0);
+    let lower_x = planes(COMB_PITCH - COMB_TOOTH - 2.0 * clearance, 12);
+    let lower = [&lower_x, &y[..], &[-COMB_BAR, 0.0, COMB_DEPTH]];
+    let lower = cells(lower, |[i, _, k]| k == 0 || i % 2 == 0);
+    let mut held = body(mesh(upper));
+    held.reference_point = Point3::new(0.0, 0.0, -0.5 * COMB_DEPTH);
+    (held, obstacle("comb", mesh(lower), Pose::identity()))
+}
 
 /// By how much half a tooth is wider at the root circle than at the base circle, rad.
 const ROOT_WIDENING: f64 = 5e-3;
@@ -23,6 +56,33 @@ pub struct Gear {
     pub half_width: f64,
     /// Straight pieces of one flank.
     pub pieces: usize,
+}
+
+/// Gears of module 2 mm: 20 teeth, each flank set back by 0.1 mm along the pitch circle, against 40 that stand, and where these are.
+///
+/// Involutes stay parallel under rotation: the free play is 0.1 mm / 20 mm = 0.005 rad each way. Then the contact is a force along the line of
+/// action, which touches the base circle r_b: turning on by d gives lambda = r_b d / (1/m + r_b^2 / I), torque k_h k_s r_b lambda.
+pub fn gears(pieces: usize) -> (Gear, Gear, Pose) {
+    let turning = Gear {
+        module: 2e-3,
+        teeth: 20,
+        pressure_angle: 20.0_f64.to_radians(),
+        set_back: 0.1e-3,
+        half_width: 5e-3,
+        pieces,
+    };
+    let standing = Gear {
+        teeth: 40,
+        set_back: 0.0,
+        half_width: 8e-3,
+        ..turning
+    };
+    // A gap between two teeth faces the tooth at x.
+    let place = Pose::from_parts(
+        Translation3::new(turning.pitch_radius() + standing.pitch_radius(), 0.0, 0.0),
+        UnitQuaternion::from_scaled_axis(Vector3::z() * (PI + PI / standing.teeth as f64)),
+    );
+    (turning, standing, place)
 }
 
 impl Gear {

@@ -1,7 +1,9 @@
 //! Bodies and obstacles for scenes that are made in code.
 
+use std::sync::Arc;
+
 use god_object::geometry::mass_properties;
-use god_object::{Body, Mesh, Obstacle, Pose, Surface};
+use god_object::{Body, Mesh, Obstacle, Pose, Surface, World};
 use nalgebra::Point3;
 use taut_scene::RawMesh;
 
@@ -31,6 +33,12 @@ pub fn obstacle(name: &str, mesh: Mesh, pose: Pose) -> Obstacle {
         pose,
         surface: Surface::default(),
     }
+}
+
+/// A body among obstacles.
+pub fn world(body: Body, obstacles: impl Into<Vec<Obstacle>>) -> Arc<World> {
+    let obstacles = obstacles.into();
+    Arc::new(World { body, obstacles })
 }
 
 /// The solid that fills the cells `filled(i, j, k)` of the grid with these planes, m. Filled cells must meet in faces or not at all.

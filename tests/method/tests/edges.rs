@@ -7,7 +7,8 @@ use god_object::collision::{CollisionWorkspace, Work};
 use god_object::constraint::collect_contacts;
 use god_object::{Body, Coupling, GodObject, Mesh, Pose, Primitive, Settings, World};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use taut_method_tests::solids::{body, cells, mesh, obstacle};
+use taut_method_tests::machined::{COMB_DEPTH, combs};
+use taut_method_tests::solids::{body, mesh, obstacle, world};
 use taut_scene::shapes::{Axis, box_with_hole, cuboid, cylinder, sphere};
 
 /// Updates of the god-object in milliseconds: 1000, 333 and 71 Hz. Forces come at 1 kHz.
@@ -37,14 +38,9 @@ fn run(
 #[test]
 fn the_plane_beyond_the_end_of_a_plate_is_felt_for_a_few_updates_only() {
     let radius = 0.005;
-    let world = Arc::new(World {
-        body: body(mesh(sphere(radius, 3))),
-        obstacles: vec![obstacle(
-            "plate",
-            mesh(cuboid([0.05, 0.05, 0.01])),
-            Pose::translation(-0.05, 0.0, -0.01),
-        )],
-    });
+    let place = Pose::translation(-0.05, 0.0, -0.01);
+    let plate = obstacle("plate", mesh(cuboid([0.05, 0.05, 0.01])), place);
+    let world = world(body(mesh(sphere(radius, 3))), [plate]);
     let settings = Settings::for_size(2.0 * radius);
     let (speed, depth) = (0.2, 0.005);
     for period in PERIODS {
@@ -82,14 +78,9 @@ fn the_plane_beyond_the_end_of_a_plate_is_felt_for_a_few_updates_only() {
 /// direction is no more than what the period's staleness and half a facet explain.
 fn lags_by_its_staleness(radius: f64, speed: f64, facets: usize, period: u32) {
     let (ball, depth) = (0.002, 0.003);
-    let world = Arc::new(World {
-        body: body(mesh(sphere(ball, 3))),
-        obstacles: vec![obstacle(
-            "cylinder",
-            mesh(cylinder(radius, 0.05, facets, Axis::Z)),
-            Pose::identity(),
-        )],
-    });
+    let round = mesh(cylinder(radius, 0.05, facets, Axis::Z));
+    let round = obstacle("cylinder", round, Pose::identity());
+    let world = world(body(mesh(sphere(ball, 3))), [round]);
     let settings = Settings::for_size(2.0 * ball);
     let angle = |k: u32| speed / radius * (f64::from(k) - 60.0).max(0.0) * 1e-3;
     let path = (0..700).map(|k| {
@@ -157,14 +148,9 @@ fn a_bar_across_a_bent_ridge_comes_to_rest_in_its_notch_at_once() {
     let bar = cuboid([0.1 * size, 0.4 * size, 0.1 * size]);
     let settings = Settings::for_size(size);
     for (aside, tilt) in [(0.0, 0.0), (0.1, 0.2), (0.3, 0.0), (0.3, -0.2), (0.5, 0.2)] {
-        let world = Arc::new(World {
-            body: body(mesh(bar.clone())),
-            obstacles: vec![obstacle(
-                "ridge",
-                notched_ridge(size, 0.05, aside),
-                Pose::identity(),
-            )],
-        });
+        let ridge = notched_ridge(size, 0.05, aside);
+        let ridge = obstacle("ridge", ridge, Pose::identity());
+        let world = world(body(mesh(bar.clone())), [ridge]);
         let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * tilt)
             * UnitQuaternion::from_scaled_axis(Vector3::y() * FRAC_PI_4);
         let at = |x: f64, z: f64| {
@@ -184,37 +170,12 @@ fn a_bar_across_a_bent_ridge_comes_to_rest_in_its_notch_at_once() {
     }
 }
 
-/// Combs of eleven teeth, 4 mm apart, 2 mm wide, 10 mm deep.
 #[test]
 fn combs_lock_after_their_clearance_whatever_the_number_of_contacts() {
-    let (pitch, tooth, depth, thick) = (4e-3, 2e-3, 10e-3, 3e-3);
+    let depth = COMB_DEPTH;
     for clearance in [0.2e-3, 0.05e-3] {
-        let comb = |width: f64, teeth: usize| -> Vec<f64> {
-            let first = -0.5 * (teeth - 1) as f64 * pitch;
-            (0..teeth)
-                .flat_map(|k| {
-                    let middle = first + k as f64 * pitch;
-                    [middle - 0.5 * width, middle + 0.5 * width]
-                })
-                .collect()
-        };
-        let y = [-5e-3, 5e-3];
-        // Teeth down, under a bar; teeth up, on a bar, in the gaps of the other and beyond.
-        let upper_x = comb(tooth, 11);
-        let upper = mesh(cells([&upper_x, &y, &[-depth, 0.0, thick]], |[i, _, k]| {
-            k == 1 || i % 2 == 0
-        }));
-        let lower_x = comb(pitch - tooth - 2.0 * clearance, 12);
-        let lower = mesh(cells([&lower_x, &y, &[-thick, 0.0, depth]], |[i, _, k]| {
-            k == 0 || i % 2 == 0
-        }));
-        let mut held = body(upper);
-        // In the middle of the teeth: a push to the side has no lever.
-        held.reference_point = Point3::new(0.0, 0.0, -0.5 * depth);
-        let world = Arc::new(World {
-            body: held,
-            obstacles: vec![obstacle("comb", lower, Pose::identity())],
-        });
+        let (held, comb) = combs(clearance);
+        let world = world(held, [comb]);
         let settings = Settings::for_size(0.044);
         let mut coupling = Coupling::new(&world, &settings);
         let mut god_object = GodObject::new(
@@ -285,10 +246,8 @@ fn a_ball_in_a_hollow_feels_the_facets_that_it_comes_to_in_time() {
     };
     for facets in [24, 72, 360] {
         let hole = box_with_hole([0.03; 3], 0.01, facets, Axis::Y);
-        let world = Arc::new(World {
-            body: ball.clone(),
-            obstacles: vec![obstacle("hollow", mesh(hole), Pose::identity())],
-        });
+        let hollow = obstacle("hollow", mesh(hole), Pose::identity());
+        let world = world(ball.clone(), [hollow]);
         let settings = Settings::for_size(2.0 * radius);
         let device = |angle: f64| {
             let deep = Vector3::new(angle.sin(), 0.0, -angle.cos()) * 2e-3;

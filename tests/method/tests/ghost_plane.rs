@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use crate::geometry_shapes::{Soup, cuboid, grid_box, mesh, read_ply};
-use god_object::geometry::mass_properties;
-use god_object::{Body, Mesh, Obstacle, Pose, Settings, Surface, World};
+use god_object::{Mesh, Pose, Settings, World};
 use nalgebra::Vector3;
 use taut_method_tests::hand::Random;
 use taut_method_tests::motion::Led;
+use taut_method_tests::solids;
 
 /// Half the side of the plate, m, and half its thickness.
 const HALF_SIDE: f64 = 0.1;
@@ -35,23 +35,9 @@ fn plate(cells: usize) -> Soup {
 }
 
 fn world(body: &Mesh, plate: Soup) -> Arc<World> {
-    let solid = mass_properties(body);
-    Arc::new(World {
-        body: Body {
-            primitive: None,
-            mesh: body.clone(),
-            mass: 1.0,
-            inertia: solid.inertia_per_density / solid.volume,
-            reference_point: solid.centroid,
-        },
-        obstacles: vec![Obstacle {
-            primitive: None,
-            name: "plate".into(),
-            mesh: mesh(plate),
-            pose: world_from_plate() * Pose::translation(0.0, 0.0, -HALF_THICKNESS),
-            surface: Surface::default(),
-        }],
-    })
+    let place = world_from_plate() * Pose::translation(0.0, 0.0, -HALF_THICKNESS);
+    let plate = solids::obstacle("plate", mesh(plate), place);
+    solids::world(solids::body(body.clone()), [plate])
 }
 
 /// Askew, so that no coordinate is a round number.

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use god_object::geometry::mass_properties;
-use god_object::{Body, Mesh, Obstacle, Pose, Settings, Surface, World};
+use god_object::{Mesh, Obstacle, Pose, Settings, World};
 use nalgebra::Vector3;
 use taut_method_tests::assembly::ASSEMBLIES;
 use taut_method_tests::checker::PenetrationChecker;
 use taut_method_tests::motion::{Led, traced};
+use taut_method_tests::solids::{body, mesh, obstacle, world};
 use taut_scene::{DeviceTrace, data_file, read_mesh};
 
 fn trace(name: &str) -> Option<DeviceTrace> {
@@ -28,7 +28,7 @@ fn bunny(triangles: &str) -> Option<Mesh> {
         return None;
     };
     let raw = read_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
-    Some(Mesh::new(raw.vertices, raw.triangles).expect("the bunny is closed"))
+    Some(mesh(raw))
 }
 
 /// Follows the rows and checks every pose; returns the share of updates in contact and the last sample.
@@ -62,32 +62,20 @@ fn swing_a_bunny(every: usize) {
         return;
     };
     let rows: Vec<(f64, Pose)> = traced(&trace).step_by(every).collect();
-    let solid = mass_properties(&small);
     // In the way of the hand, where it is after a quarter, a half and three quarters of the minute; apart from the start.
     let obstacles = [1, 2, 3].map(|quarter| {
         let there = rows[quarter * rows.len() / 4].1;
-        Obstacle {
-            primitive: None,
-            name: format!("bunny {quarter}"),
-            mesh: large.clone(),
-            pose: Pose::new(there.translation.vector, Vector3::y() * quarter as f64),
-            surface: Surface::default(),
-        }
+        let pose = Pose::new(there.translation.vector, Vector3::y() * quarter as f64);
+        obstacle(&format!("bunny {quarter}"), large.clone(), pose)
     });
     let apart =
         |o: &Obstacle| (o.pose.translation.vector - rows[0].1.translation.vector).norm() > 0.25;
     let obstacles: Vec<Obstacle> = obstacles.into_iter().filter(apart).collect();
     assert!(!obstacles.is_empty(), "the hand never leaves its start");
-    let world = Arc::new(World {
-        body: Body {
-            primitive: None,
-            mesh: small,
-            mass: 0.5,
-            inertia: solid.inertia_per_density * (0.5 / solid.volume),
-            reference_point: solid.centroid,
-        },
-        obstacles,
-    });
+    let mut held = body(small);
+    held.mass = 0.5;
+    held.inertia *= held.mass;
+    let world = world(held, obstacles);
     let (touching, _) = follow(world, &Settings::for_size(0.15), &rows);
     println!("in contact for {touching} of the time");
     assert!(touching > 0.05, "in contact for {touching} of the time");

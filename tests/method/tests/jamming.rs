@@ -5,12 +5,10 @@
 //! both of their friction cones full: without a side force, where the push is more than `2 mu M / l`; with one, on the side of his parallelogram.
 //! Here the tilt of the peg is not neglected.
 
-use std::sync::Arc;
-
 use god_object::spatial::{angular, linear};
-use god_object::{Coupling, GodObject, Pose, Settings, World};
+use god_object::{Coupling, GodObject, Pose, Settings};
 use nalgebra::{Matrix3, Translation3, UnitQuaternion, Vector2, Vector3};
-use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_method_tests::solids::{body, mesh, obstacle, world};
 use taut_scene::shapes::cuboid;
 
 /// Half of the peg across the hole, along it and in depth, m; clearance on each side.
@@ -36,16 +34,13 @@ fn push_at_slip(friction: f64, inserted: f64, turn: f64, aside: f64) -> [f64; 2]
         wall.surface.friction = friction;
         wall
     };
-    let world = World {
-        body: body(mesh(cuboid(HALF))),
-        obstacles: vec![wall("left", -1.0), wall("right", 1.0)],
-    };
+    let walls = [wall("left", -1.0), wall("right", 1.0)];
+    let world = world(body(mesh(cuboid(HALF))), walls);
     let settings = Settings {
         force_limit: 1e3,
         torque_limit: 1e3,
         ..Settings::for_size(2.0 * HALF[1]).with_clearance(CLEARANCE)
     };
-    let world = Arc::new(world);
     let start = HALF[1] - inserted;
     let device = |turned: f64, pushed: f64| {
         Pose::from_parts(

@@ -1,15 +1,14 @@
 //! Gears and threads: many contacts that lie on each other, with the answers of their own geometry.
 
-use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
+use std::f64::consts::TAU;
 
 use god_object::spatial::angular;
-use god_object::{Pose, Settings, World};
+use god_object::{Pose, Settings};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use taut_method_tests::checker::PenetrationChecker;
-use taut_method_tests::machined::{Gear, Thread};
+use taut_method_tests::machined::{Thread, gears};
 use taut_method_tests::motion::Led;
-use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_method_tests::solids::{body, mesh, obstacle, world};
 
 fn turned(angle: f64, z: f64) -> Pose {
     Pose::from_parts(
@@ -18,38 +17,12 @@ fn turned(angle: f64, z: f64) -> Pose {
     )
 }
 
-/// Module 2 mm, 20 teeth against 40 that stand still, 60 mm apart; each flank of the turning one set back by 0.1 mm at the pitch circle.
-///
-/// Involutes stay parallel to each other under rotation, so the free play is exactly 0.1 mm / 20 mm = 0.005 rad each way. Then the contact is a
-/// force along the line of action, which touches the base circle r_b: turning on by d gives
-/// lambda = r_b d / (1/m + r_b^2 / I), force k_h k_s lambda, torque r_b times that.
 #[test]
 fn a_gear_turns_freely_through_its_backlash_and_then_is_stiff() {
-    let turning = Gear {
-        module: 2e-3,
-        teeth: 20,
-        pressure_angle: 20.0_f64.to_radians(),
-        set_back: 0.1e-3,
-        half_width: 5e-3,
-        pieces: 24,
-    };
-    let standing = Gear {
-        teeth: 40,
-        set_back: 0.0,
-        half_width: 8e-3,
-        ..turning
-    };
-    // A gap between two teeth faces the tooth at x.
-    let place = Pose::from_parts(
-        Translation3::new(turning.pitch_radius() + standing.pitch_radius(), 0.0, 0.0),
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI + PI / standing.teeth as f64),
-    );
+    let (turning, standing, place) = gears(24);
     let held = body(mesh(turning.mesh()));
     let (inertia, base) = (held.inertia[(2, 2)], turning.base_radius());
-    let world = Arc::new(World {
-        body: held,
-        obstacles: vec![obstacle("gear", mesh(standing.mesh()), place)],
-    });
+    let world = world(held, [obstacle("gear", mesh(standing.mesh()), place)]);
     let checker = PenetrationChecker::new(&world);
     let settings = Settings::for_size(0.044);
     let gain = settings.k_h * settings.k_s;
@@ -114,10 +87,8 @@ impl NutOnBolt {
         };
         let nut = body(mesh(thread.nut(2, Self::CLEARANCE, 8e-3)));
         let inertia = nut.inertia[(2, 2)];
-        let world = Arc::new(World {
-            body: nut,
-            obstacles: vec![obstacle("bolt", mesh(thread.bolt(7)), Pose::identity())],
-        });
+        let bolt = obstacle("bolt", mesh(thread.bolt(7)), Pose::identity());
+        let world = world(nut, [bolt]);
         let settings = Settings::for_size(0.016);
         let start = thread.pitch;
         Self {

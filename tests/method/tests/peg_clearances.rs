@@ -16,7 +16,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use taut_method_tests::checker::PenetrationChecker;
 use taut_method_tests::hand::{HandError, Random};
 use taut_method_tests::motion::{Led, Sample};
-use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_method_tests::solids::{self, body, mesh, obstacle};
 use taut_scene::shapes::{Axis, box_with_hole, cylinder};
 
 const CLEARANCES: [f64; 3] = [0.5e-3, 0.1e-3, 0.05e-3];
@@ -36,13 +36,11 @@ const PERIOD: f64 = 0.012;
 /// What counts as no force or torque beside a force of newtons, relative to it (a torque: times a metre).
 const NONE: f64 = 1e-6;
 
-fn world(clearance: f64, facets: usize, world_from_hole: Pose) -> World {
+fn world(clearance: f64, facets: usize, world_from_hole: Pose) -> Arc<World> {
     let peg = cylinder(PEG_RADIUS, HALF_LENGTH, facets, Axis::Y);
     let hole = box_with_hole([HALF_LENGTH; 3], PEG_RADIUS + clearance, facets, Axis::Y);
-    World {
-        body: body(mesh(peg)),
-        obstacles: vec![obstacle("box", mesh(hole), world_from_hole)],
-    }
+    let hole = obstacle("box", mesh(hole), world_from_hole);
+    solids::world(body(mesh(peg)), [hole])
 }
 
 /// What one run leaves, in the hole's frame.
@@ -61,7 +59,7 @@ fn insert(clearance: f64, facets: usize, seed: u64) -> Inserted {
         Translation3::from(random.direction() * random.unit()),
         random.rotation(),
     );
-    let world = Arc::new(world(clearance, facets, world_from_hole));
+    let world = world(clearance, facets, world_from_hole);
     let checker = PenetrationChecker::new(&world);
     let settings = Settings::for_size(2.0 * HALF_LENGTH);
     let start = 2.0 * HALF_LENGTH + 0.005;
@@ -172,7 +170,7 @@ fn fifty_micrometres_are_a_clearance_in_every_orientation() {
 #[test]
 fn a_peg_that_is_tilted_against_both_rims_does_not_jam() {
     let clearance = 0.1e-3;
-    let world = Arc::new(world(clearance, 72, Pose::identity()));
+    let world = world(clearance, 72, Pose::identity());
     let checker = PenetrationChecker::new(&world);
     let settings = Settings::for_size(2.0 * HALF_LENGTH);
     // 20 mm in, where two points touch at a tilt of 2 c / 20 mm = 10 mrad; the hand tilts by 20 mrad.

@@ -1,23 +1,17 @@
 //! The same scene a thousand times smaller or larger, or a kilometre away, feels the same.
 
-use std::sync::Arc;
-
-use god_object::{Pose, Settings, Vector6, World};
+use god_object::{Pose, Settings, Vector6};
 use nalgebra::Vector3;
 use taut_method_tests::motion::Led;
-use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_method_tests::solids::{body, mesh, obstacle, world};
 use taut_scene::shapes::cuboid;
 
 /// A box that lands on a table askew, slides and lifts; wrenches in units of the scale: N over `scale`, N m over its square.
 fn slide(scale: f64, away: Vector3<f64>) -> Vec<Vector6> {
-    let world = Arc::new(World {
-        body: body(mesh(cuboid([0.02, 0.02, 0.01].map(|x| x * scale)))),
-        obstacles: vec![obstacle(
-            "table",
-            mesh(cuboid([0.5, 0.5, 0.05].map(|x| x * scale))),
-            Pose::translation(away.x, away.y, away.z - 0.05 * scale),
-        )],
-    });
+    let block = |half: [f64; 3]| mesh(cuboid(half.map(|x| x * scale)));
+    let place = Pose::translation(away.x, away.y, away.z - 0.05 * scale);
+    let table = obstacle("table", block([0.5, 0.5, 0.05]), place);
+    let world = world(body(block([0.02, 0.02, 0.01])), [table]);
     let mut settings = Settings::for_size(0.04 * scale);
     settings.force_limit = 1e9;
     settings.torque_limit = 1e9;

@@ -11,7 +11,7 @@ use god_object::{Pose, Settings, Vector6, World};
 use nalgebra::{Point3, Vector3};
 use taut_method_tests::checker::PenetrationChecker;
 use taut_method_tests::motion::Led;
-use taut_method_tests::solids::{body, cells, mesh, obstacle};
+use taut_method_tests::solids::{body, cells, mesh, obstacle, world};
 use taut_scene::shapes::{Axis, cuboid, cylinder};
 
 /// K_t of 1 kg and the default gains, N/m.
@@ -21,10 +21,8 @@ const STIFFNESS: f64 = 1000.0;
 fn cube_over_plate(half: f64, thickness: f64, side: f64) -> Arc<World> {
     let plate = mesh(cuboid([side, side, 0.5 * thickness]));
     let below = Pose::translation(0.0, 0.0, -0.5 * thickness);
-    Arc::new(World {
-        body: body(mesh(cuboid([half; 3]))),
-        obstacles: vec![obstacle("plate", plate, below)],
-    })
+    let plate = obstacle("plate", plate, below);
+    world(body(mesh(cuboid([half; 3]))), [plate])
 }
 
 /// Across the plate alone, and there what the depth asks for, to the limit; lengths of a metre are `scale` metres.
@@ -118,14 +116,9 @@ fn a_plate_holds_when_everything_is_a_thousand_times_smaller_or_larger() {
 
 #[test]
 fn a_fast_cube_stops_at_a_thin_plate() {
-    let world = Arc::new(World {
-        body: body(mesh(cuboid([0.5e-3; 3]))),
-        obstacles: vec![obstacle(
-            "plate",
-            mesh(cuboid([0.1, 0.1, 0.05e-3])),
-            Pose::identity(),
-        )],
-    });
+    let plate = mesh(cuboid([0.1, 0.1, 0.05e-3]));
+    let plate = obstacle("plate", plate, Pose::identity());
+    let world = world(body(mesh(cuboid([0.5e-3; 3]))), [plate]);
     let settings = Settings {
         k_s: 1.0,
         ..Settings::for_size(1e-3)
@@ -197,10 +190,8 @@ fn a_body_inside_a_u_stays_inside_until_the_hand_has_walked_round_its_end() {
         |[i, _, k]| k == 0 || i != 1,
     );
     let half = 0.004;
-    let world = Arc::new(World {
-        body: body(mesh(cuboid([half; 3]))),
-        obstacles: vec![obstacle("u", mesh(u_shape), Pose::identity())],
-    });
+    let u_shape = obstacle("u", mesh(u_shape), Pose::identity());
+    let world = world(body(mesh(cuboid([half; 3]))), [u_shape]);
     let checker = PenetrationChecker::new(&world);
     let settings = Settings::for_size(2.0 * half);
     let mut led = Led::in_world(world, &settings, Pose::translation(0.0, 0.0, 0.03));

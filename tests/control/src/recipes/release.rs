@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::{Coupling, GodObject, Pose, Settings, World};
-use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_method_tests::solids::{self, body, mesh, obstacle};
 use taut_plant::{Grip, Hand, MinJerkPath, Motors, Plant, ViaPoint};
 use taut_scene::shapes::{Axis, box_with_hole, cylinder};
 
@@ -68,13 +68,11 @@ struct Seen {
     moved: f64,
 }
 
-fn world() -> World {
+fn world() -> Arc<World> {
     let peg = cylinder(PEG.0, PEG.1, FACETS, Axis::Y);
     let hole = box_with_hole([PEG.1; 3], PEG.0 + CLEARANCE, FACETS, Axis::Y);
-    World {
-        body: body(mesh(peg)),
-        obstacles: vec![obstacle("box", mesh(hole), Pose::identity())],
-    }
+    let hole = obstacle("box", mesh(hole), Pose::identity());
+    solids::world(body(mesh(peg)), [hole])
 }
 
 /// A firm hand that presses the device, in equilibrium, `SIDEWAYS` to the side.
@@ -90,7 +88,7 @@ fn pressing(stiffness: f64, start: Pose) -> MinJerkPath {
 }
 
 fn let_go(settings: &Settings) -> Seen {
-    let world = Arc::new(world());
+    let world = world();
     let stiffness = settings.stiffness(world.body.mass);
     let start = Pose::translation(0.0, 2.0 * PEG.1 - INSERTED, 0.0);
     let mut coupling = Coupling::new(&world, settings);

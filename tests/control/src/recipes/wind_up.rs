@@ -10,7 +10,7 @@ use std::sync::Arc;
 use god_object::spatial::rotation_vector;
 use god_object::{Coupling, GodObject, Pose, Settings, World};
 use nalgebra::Vector3;
-use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_method_tests::solids::{self, body, mesh, obstacle};
 use taut_scene::shapes::cuboid;
 
 use crate::closed_loop::PERIOD;
@@ -61,23 +61,18 @@ struct Seen {
     gap: f64,
 }
 
-fn world() -> World {
+fn world() -> Arc<World> {
     let y = BAR[1] + CLEARANCE + WALL[1];
     let wall = |name: &str, side: f64| {
-        obstacle(
-            name,
-            mesh(cuboid(WALL)),
-            Pose::translation(0.0, side * y, 0.0),
-        )
+        let place = Pose::translation(0.0, side * y, 0.0);
+        obstacle(name, mesh(cuboid(WALL)), place)
     };
-    World {
-        body: body(mesh(cuboid(BAR))),
-        obstacles: vec![wall("left", 1.0), wall("right", -1.0)],
-    }
+    let walls = [wall("left", 1.0), wall("right", -1.0)];
+    solids::world(body(mesh(cuboid(BAR))), walls)
 }
 
 fn lead(whole_turn: f64) -> (Seen, f64) {
-    let world = Arc::new(world());
+    let world = world();
     let settings = Settings::for_size(2.0 * BAR[0]);
     let rotational = settings.stiffness(1.0) * world.body.inertia[(2, 2)];
     let settings = Settings {

@@ -1,13 +1,11 @@
 //! R32: meshes with faults: each is refused by name, or behaves as the sound mesh does.
 
-use std::sync::Arc;
-
 use god_object::geometry::MeshError;
 use god_object::spatial::linear;
-use god_object::{Mesh, Pose, Settings, World};
+use god_object::{Mesh, Pose, Settings};
 use nalgebra::Vector3;
 use taut_method_tests::motion::Led;
-use taut_method_tests::solids::{cells, obstacle};
+use taut_method_tests::solids::{cells, obstacle, world};
 use taut_scene::RawMesh;
 use taut_scene::shapes::cuboid;
 
@@ -177,10 +175,8 @@ fn with_feature() -> RawMesh {
 /// Forces of a ball that comes down on the plate, 3 mm deep, and slides.
 fn slide(raw: RawMesh, away: Vector3<f64>) -> Option<Vec<Vector3<f64>>> {
     let mesh = Mesh::new(raw.vertices, raw.triangles).ok()?;
-    let world = Arc::new(World {
-        body: ball(RADIUS),
-        obstacles: vec![obstacle("plate", mesh, Pose::from(away))],
-    });
+    let plate = obstacle("plate", mesh, Pose::from(away));
+    let world = world(ball(RADIUS), [plate]);
     let at = |k: u32| {
         let time = f64::from(k) * 1e-3;
         let height = 1e-3 - (DEPTH + 1e-3) * (time / 0.1).min(1.0);

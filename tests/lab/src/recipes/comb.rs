@@ -1,12 +1,10 @@
 //! R25: combs of eleven teeth in each other, and a gear in another: many contacts at once, then stiff.
 
-use std::f64::consts::PI;
-
 use god_object::Pose;
 use god_object::spatial::{angular, linear, six};
-use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
-use taut_method_tests::machined::Gear;
-use taut_method_tests::solids::{body, cells, mesh, obstacle};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use taut_method_tests::machined::{COMB_DEPTH, combs, gears};
+use taut_method_tests::solids::{body, mesh, obstacle};
 
 use super::Extent;
 use super::bodies::{Path, along, force, largest_from, smooth, sound_and, turns};
@@ -14,10 +12,6 @@ use crate::measure::Measure;
 use crate::method::Scene;
 use crate::recipe::{Ideal, Probe, Recipe};
 
-const PITCH: f64 = 4e-3;
-const TOOTH: f64 = 2e-3;
-const DEPTH: f64 = 10e-3;
-const BAR: f64 = 3e-3;
 const CLEARANCES: [f64; 2] = [0.2e-3, 0.05e-3];
 const SPEED: f64 = 0.05;
 /// How far the device is pushed to either side, m.
@@ -33,38 +27,16 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
 }
 
 fn comb(extent: Extent, clearance: f64) -> Recipe {
-    let planes = |width: f64, teeth: usize| -> Vec<f64> {
-        let first = -0.5 * (teeth - 1) as f64 * PITCH;
-        (0..teeth)
-            .flat_map(|k| {
-                let middle = first + k as f64 * PITCH;
-                [middle - 0.5 * width, middle + 0.5 * width]
-            })
-            .collect()
-    };
-    let y = [-5e-3, 5e-3];
-    // Teeth down, under a bar; teeth up, on a bar, in the gaps of the other and beyond.
-    let upper_x = planes(TOOTH, 11);
-    let upper = cells([&upper_x, &y, &[-DEPTH, 0.0, BAR]], |[i, _, k]| {
-        k == 1 || i % 2 == 0
-    });
-    let lower_x = planes(PITCH - TOOTH - 2.0 * clearance, 12);
-    let lower = cells([&lower_x, &y, &[-BAR, 0.0, DEPTH]], |[i, _, k]| {
-        k == 0 || i % 2 == 0
-    });
-    let mut held = body(mesh(upper));
-    // In the middle of the teeth: a push to the side has no lever.
-    held.reference_point = Point3::new(0.0, 0.0, -0.5 * DEPTH);
+    let (held, comb) = combs(clearance);
     let at = |x: f64, z: f64| Vector3::new(x, 0.0, z);
-    let inserted = DEPTH + 2e-3; // 8 mm of the teeth overlap
-    let path = Path::from(at(0.0, 2.0 * DEPTH + 1e-3))
+    let inserted = COMB_DEPTH + 2e-3; // 8 mm of the teeth overlap
+    let path = Path::from(at(0.0, 2.0 * COMB_DEPTH + 1e-3))
         .to(at(0.0, inserted), SPEED)
         .to(at(OFFSET, inserted), SPEED)
         .hold(0.1)
         .to(at(-OFFSET, inserted), SPEED)
         .hold(0.1)
         .to(at(0.0, inserted), SPEED);
-    let comb = obstacle("comb", mesh(lower), Pose::identity());
     let scene = Scene::new(held, [comb], SIZE, SPEED, path.pose(0.0));
     let (stiffness, rest) = (scene.stiffness(), scene.settings.rest_distance);
     let ideal = path.clone();
@@ -89,7 +61,7 @@ fn comb(extent: Extent, clearance: f64) -> Recipe {
         probes: vec![Probe::at_most(
             "torque",
             "N m",
-            0.01 * stiffness * OFFSET * DEPTH,
+            0.01 * stiffness * OFFSET * COMB_DEPTH,
             largest_from(0.0, |tick| angular(&tick.wrench).norm()),
         )],
         ..along(case, about, scene, path)
@@ -113,30 +85,8 @@ fn turned(time: f64) -> f64 {
     }
 }
 
-/// Module 2 mm, 20 teeth against 40 that stand, each flank of the turning one set back by 0.1 mm along the pitch circle.
-///
-/// Involutes stay parallel under rotation: the free play is 0.1 mm / 20 mm = 0.005 rad each way. Then the contact is a force along the line of
-/// action, which touches the base circle r_b: turning on by d gives lambda = r_b d / (1/m + r_b^2 / I), torque k_h k_s r_b lambda.
 fn gear(extent: Extent) -> Recipe {
-    let turning = Gear {
-        module: 2e-3,
-        teeth: 20,
-        pressure_angle: 20.0_f64.to_radians(),
-        set_back: 0.1e-3,
-        half_width: 5e-3,
-        pieces: extent.choose(24, 12),
-    };
-    let standing = Gear {
-        teeth: 40,
-        set_back: 0.0,
-        half_width: 8e-3,
-        ..turning
-    };
-    // A gap between two teeth faces the tooth at x.
-    let place = Pose::from_parts(
-        Translation3::new(turning.pitch_radius() + standing.pitch_radius(), 0.0, 0.0),
-        UnitQuaternion::from_scaled_axis(Vector3::z() * (PI + PI / standing.teeth as f64)),
-    );
+    let (turning, standing, place) = gears(extent.choose(24, 12));
     let held = body(mesh(turning.mesh()));
     let (inertia, base) = (held.inertia[(2, 2)], turning.base_radius());
     let device = |time: f64| {
