@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use god_object::{Body, Obstacle, Pose};
-use nalgebra::{Point3, Rotation2, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Point3, Rotation2, Vector2, Vector3};
 use taut_scene::RawMesh;
 
 use crate::solids::{body, cells, mesh, obstacle};
@@ -78,9 +78,9 @@ pub fn gears(pieces: usize) -> (Gear, Gear, Pose) {
         ..turning
     };
     // A gap between two teeth faces the tooth at x.
-    let place = Pose::from_parts(
-        Translation3::new(turning.pitch_radius() + standing.pitch_radius(), 0.0, 0.0),
-        UnitQuaternion::from_scaled_axis(Vector3::z() * (PI + PI / standing.teeth as f64)),
+    let place = Pose::new(
+        Vector3::new(turning.pitch_radius() + standing.pitch_radius(), 0.0, 0.0),
+        Vector3::z() * (PI + PI / standing.teeth as f64),
     );
     (turning, standing, place)
 }

@@ -7,7 +7,7 @@
 
 use god_object::spatial::{angular, linear};
 use god_object::{Coupling, GodObject, Pose, Settings};
-use nalgebra::{Matrix3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use taut_method_tests::solids::{body, mesh, obstacle, world};
 use taut_scene::shapes::cuboid;
 
@@ -43,9 +43,9 @@ fn push_at_slip(friction: f64, inserted: f64, turn: f64, aside: f64) -> [f64; 2]
     };
     let start = HALF[1] - inserted;
     let device = |turned: f64, pushed: f64| {
-        Pose::from_parts(
-            Translation3::new(aside * turned / turn, start - pushed, 0.0),
-            UnitQuaternion::from_scaled_axis(Vector3::z() * turned),
+        Pose::new(
+            Vector3::new(aside * turned / turn, start - pushed, 0.0),
+            Vector3::z() * turned,
         )
     };
     let mut peg = GodObject::new(world.clone(), settings, device(0.0, 0.0)).expect("it is free");

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use god_object::Pose;
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::{data_file, read_mesh};
 
@@ -74,9 +74,9 @@ fn recipe(file: &str) -> Option<Recipe> {
         let twist = ((time - 1.3) / 0.4).clamp(0.0, 1.0);
         let smooth = |share: f64| 0.5 - 0.5 * (PI * share).cos();
         let height = APART + (PRESSED - APART) * smooth(down);
-        Pose::from_parts(
-            Translation3::new(0.03 * smooth(slide), height, 0.01 * smooth(slide)),
-            UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.4, 0.1) * smooth(twist)),
+        Pose::new(
+            Vector3::new(0.03 * smooth(slide), height, 0.01 * smooth(slide)),
+            Vector3::new(0.0, 0.4, 0.1) * smooth(twist),
         )
     };
     let scene = Scene::new(body(bunny), obstacles, SIZE, 0.27, device(0.0));

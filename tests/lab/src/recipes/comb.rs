@@ -2,7 +2,7 @@
 
 use god_object::Pose;
 use god_object::spatial::{angular, linear, six};
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use taut_method_tests::machined::{COMB_DEPTH, combs, gears};
 use taut_method_tests::solids::{body, mesh, obstacle};
 
@@ -89,12 +89,7 @@ fn gear(extent: Extent) -> Recipe {
     let (turning, standing, place) = gears(extent.choose(24, 12));
     let held = body(mesh(turning.mesh()));
     let (inertia, base) = (held.inertia[(2, 2)], turning.base_radius());
-    let device = |time: f64| {
-        Pose::from_parts(
-            Translation3::identity(),
-            UnitQuaternion::from_scaled_axis(Vector3::z() * turned(time)),
-        )
-    };
+    let device = |time: f64| Pose::new(Vector3::zeros(), Vector3::z() * turned(time));
     let gear = obstacle("gear", mesh(standing.mesh()), place);
     let scene = Scene::new(held, [gear], SIZE, RATE * 0.022, device(0.0));
     let gain = scene.settings.k_h * scene.settings.k_s;

@@ -1,7 +1,7 @@
 //! R04: a box pressed flat on a plane by a device that goes through it and tilts. While the contacts can hold the tilt the box stays flat.
 
 use god_object::spatial::{Pose, six};
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use taut_method_tests::solids::{body, mesh};
 use taut_scene::shapes::cuboid;
 
@@ -40,9 +40,9 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     };
     let device = move |time: f64| {
         let (depth, turned) = place(time);
-        Pose::from_parts(
-            Translation3::new(0.0, 0.0, HALF[2] - depth),
-            UnitQuaternion::from_scaled_axis(Vector3::new(0.0, turned, 0.0)),
+        Pose::new(
+            Vector3::new(0.0, 0.0, HALF[2] - depth),
+            Vector3::new(0.0, turned, 0.0),
         )
     };
     let mut scene = Scene::new(held.clone(), [ground()], 2.0 * HALF[0], SPEED, device(0.0));

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use god_object::spatial::{Pose, angular, linear};
-use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use super::Extent;
 use super::bodies::{block, cube, force, largest_from, sound};
@@ -25,10 +25,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         let [x, y, z] = FREQUENCIES.map(|f| REACH * (TAU * f * time).sin());
         let axis = Vector3::new(1.0, 2.0, 3.0) / 14.0_f64.sqrt();
         let turn = axis * (TURN * (TAU * time).sin());
-        Pose::from_parts(
-            Translation3::new(x, y, z),
-            UnitQuaternion::from_scaled_axis(turn),
-        )
+        Pose::new(Vector3::new(x, y, z), turn)
     };
     let speed = REACH * TAU * Vector3::from(FREQUENCIES).norm();
     let scene = Scene::new(cube(HALF), obstacles, 2.0 * HALF, speed, device(0.0));

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use god_object::Pose;
 use god_object::spatial::angular;
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use taut_method_tests::machined::Thread;
 use taut_method_tests::solids::{body, mesh, obstacle};
 
@@ -41,11 +41,9 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     let advance = move |time: f64| pitch * RATE * (time - coming).max(0.0);
     let device = move |time: f64| {
         let behind = BEHIND * (time / coming).min(1.0);
-        Pose::from_parts(
-            Translation3::new(0.0, 0.0, pitch + advance(time) - behind),
-            UnitQuaternion::from_scaled_axis(
-                Vector3::z() * (TAU * RATE * (time - coming).max(0.0)),
-            ),
+        Pose::new(
+            Vector3::new(0.0, 0.0, pitch + advance(time) - behind),
+            Vector3::z() * (TAU * RATE * (time - coming).max(0.0)),
         )
     };
     let nut = body(mesh(thread.nut(2, CLEARANCE, 8e-3)));

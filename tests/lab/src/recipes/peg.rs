@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use god_object::Pose;
 use god_object::spatial::{angular, linear};
-use nalgebra::{Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::shapes::{Axis, box_with_hole, cylinder};
 
@@ -145,10 +145,7 @@ fn tilted(extent: Extent) -> Recipe {
     let along = move |time: f64| start + (SPEED * (time - begin)).clamp(0.0, pull);
     let device = move |time: f64| {
         let turned = tilt * (time / tilted).min(1.0);
-        Pose::from_parts(
-            Translation3::new(0.0, along(time), 0.0),
-            UnitQuaternion::from_scaled_axis(Vector3::z() * turned),
-        )
+        Pose::new(Vector3::new(0.0, along(time), 0.0), Vector3::z() * turned)
     };
     let scene = scene(CLEARANCE, device(0.0));
     let k_s = scene.settings.k_s;

@@ -6,7 +6,7 @@
 use std::f64::consts::PI;
 
 use god_object::{Obstacle, Pose};
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use taut_method_tests::solids::{mesh, obstacle};
 use taut_scene::shapes::{Axis, cylinder};
 
@@ -40,10 +40,7 @@ impl Prism {
     pub(super) fn obstacle(&self, half: f64) -> Obstacle {
         // A ball comes down on the middle of a side: on a corner it could go either way.
         let half_side = Vector3::y() * (0.5 * self.side());
-        let turned = Pose::from_parts(
-            Translation3::identity(),
-            UnitQuaternion::from_scaled_axis(half_side),
-        );
+        let turned = Pose::new(Vector3::zeros(), half_side);
         let round = cylinder(self.radius, half, self.sides, Axis::Y);
         obstacle("cylinder", mesh(round), turned)
     }

@@ -1,7 +1,7 @@
 //! R10b: a thin bar spins past a pin, a third of a radian between updates at 70 Hz. It stops at first contact.
 
 use god_object::{Pose, Primitive};
-use nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Point3, Vector2, Vector3};
 use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::shapes::{Axis, cuboid, cylinder};
 
@@ -40,10 +40,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     });
     let device = |time: f64| {
         let turned = (SPIN * time).min(ANGLE + BEYOND);
-        Pose::from_parts(
-            Translation3::identity(),
-            UnitQuaternion::from_scaled_axis(Vector3::z() * turned),
-        )
+        Pose::new(Vector3::zeros(), Vector3::z() * turned)
     };
     let bar = body(mesh(cuboid(HALF)));
     let scene = Scene::new(bar, [pin], 2.0 * HALF[0], SPIN * HALF[0], device(0.0));

@@ -9,7 +9,7 @@
 //! tag of the protocol, time and number beside the pose. No loss, no delay: those are the control recipes' of coupling at the edge.
 
 use god_object::Pose;
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 use taut_proto::header::{HEADER_BYTES, TAG_BYTES};
 
 use super::{Case, Cost, Runs, Sweep};
@@ -101,9 +101,9 @@ fn counted(pose: &Pose, bits: Option<u32>) -> Pose {
     let counts = f64::from(2_u32.pow(bits));
     let round =
         |v: Vector3<f64>, range: f64| v.map(|x| (x * counts / range).round() * range / counts);
-    Pose::from_parts(
-        Translation3::from(round(place, RANGE)),
-        UnitQuaternion::from_scaled_axis(round(pose.rotation.scaled_axis(), TURN)),
+    Pose::new(
+        round(place, RANGE),
+        round(pose.rotation.scaled_axis(), TURN),
     )
 }
 
