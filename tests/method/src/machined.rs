@@ -8,10 +8,11 @@ use taut_scene::RawMesh;
 
 use crate::solids::{body, cells, mesh, obstacle};
 
-/// Pitch, width and depth of the teeth of [`combs`], and thickness of the bars that they stand on, m.
+/// Depth of the teeth of [`combs`], m.
+pub const COMB_DEPTH: f64 = 10e-3;
+/// Their pitch and width, and the thickness of the bars that they stand on, m.
 const COMB_PITCH: f64 = 4e-3;
 const COMB_TOOTH: f64 = 2e-3;
-pub const COMB_DEPTH: f64 = 10e-3;
 const COMB_BAR: f64 = 3e-3;
 
 /// A comb of eleven teeth that point down, and one whose teeth go into the gaps of the other and beyond, so much narrower on each side, m.

@@ -362,12 +362,7 @@ fn a_peg_that_is_drawn_along_its_hole_feels_coulombs_law() {
                 let time = f64::from(k) * 1e-3;
                 let along = (speed * (time - 0.5)).clamp(0.0, way);
                 let at = aside * (time / ARRIVED).min(1.0) - Vector3::y() * along;
-                let wrench = led
-                    .step(
-                        time,
-                        &Pose::from_parts(at.into(), UnitQuaternion::identity()),
-                    )
-                    .wrench;
+                let wrench = led.step(time, &Pose::from(at)).wrench;
                 let most = coefficient * wrench[0].hypot(wrench[2]);
                 // The hand has drawn by more than sticks, at 1000 N/m.
                 if time > 0.5 && 1000.0 * along > 1.3 * most {

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use god_object::Pose;
-use god_object::nalgebra::{UnitQuaternion, Vector3};
+use god_object::nalgebra::Vector3;
 
 use super::held_out::egg;
 use super::scenes::{ABOVE, FidelityScene, STIFFNESS, at, force, on, scene, share, with_hands};
@@ -13,10 +13,6 @@ use super::scenes::{ABOVE, FidelityScene, STIFFNESS, at, force, on, scene, share
 /// Where the plate of `lift.csv` begins and ends, m, and how fast it rises, m/s.
 const LIFT: [f64; 2] = [-2e-3, 4e-3];
 const LIFTING: f64 = 0.02;
-
-fn turned(x: f64, y: f64, z: f64, axis: Vector3<f64>) -> Pose {
-    Pose::from_parts(Vector3::new(x, y, z).into(), UnitQuaternion::new(axis))
-}
 
 /// On a circle of this radius about the y axis, `depth` inside it once pressed, with this speed along it,
 /// m/s; from its top on.
@@ -197,7 +193,8 @@ fn turning() -> Vec<FidelityScene> {
             0.6,
             |time| {
                 let side = 1.7e-3 * share(time);
-                turned(side, 0.0, 0.015 * on(time), Vector3::z() * (0.5 * on(time)))
+                let place = Vector3::new(side, 0.0, 0.015 * on(time));
+                Pose::new(place, Vector3::z() * (0.5 * on(time)))
             },
         ),
         scene(
@@ -211,12 +208,8 @@ fn turning() -> Vec<FidelityScene> {
             0.7,
             |time| {
                 let swing = 0.15 * (10.0 * on(time)).sin();
-                turned(
-                    0.0,
-                    0.0,
-                    0.0041 - 2.1e-3 * share(time),
-                    Vector3::y() * swing,
-                )
+                let place = Vector3::new(0.0, 0.0, 0.0041 - 2.1e-3 * share(time));
+                Pose::new(place, Vector3::y() * swing)
             },
         ),
     ]

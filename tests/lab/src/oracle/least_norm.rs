@@ -130,25 +130,15 @@ fn solve(columns: &[Vector7], used: &[(usize, f64)], target: &Vector7) -> Option
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Numbers in [-1, 1) by a linear congruence.
-    fn numbers(seed: u64) -> impl Iterator<Item = f64> {
-        let mut state = seed;
-        std::iter::repeat_with(move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        })
-    }
+    use crate::costs::uniform;
 
     #[test]
     fn it_is_within_the_half_spaces_and_nothing_within_is_shorter() {
         let mut found = 0;
         for seed in 0..200 {
-            let mut numbers = numbers(seed);
+            let mut state = seed;
             let mut vector =
-                |size: f64| Vector6::from_fn(|_, _| size * numbers.next().expect("no end"));
+                |size: f64| Vector6::from_fn(|_, _| size * (2.0 * uniform(&mut state) - 1.0));
             let inside = vector(3.0);
             let count = 1 + seed as usize % 40;
             let rows: Vec<(Vector6, f64)> = (0..count)

@@ -21,7 +21,7 @@ pub(super) fn figures(plate: &Recipe) -> Vec<Figure> {
     let mut state = 1;
     let errors = (0..PLACES).map(|_| {
         let device = Vector3::from_fn(|_, _| 0.03 * costs::uniform(&mut state) - 0.01);
-        let pose = Pose::from_parts(device.into(), nalgebra::UnitQuaternion::identity());
+        let pose = Pose::from(device);
         let found = driven(start(&scene).as_mut(), (UPDATES, 1), |_| pose);
         let found = found[found.len() - 1].0.translation.vector;
         (found - device.map(|x| x.max(HALF))).amax()

@@ -43,7 +43,7 @@ pub(in crate::recipes) fn run(extent: Extent) -> Vec<Row> {
             let flat = six(&(Vector3::z() * DEPTH), &(-(inertia * twist))) * (K_H * K_S);
             let mut first = None;
             for n in counts {
-                solver.forget_times();
+                solver.times.clear();
                 let found = solver.wrench(&metric, &wish, &underside(*n));
                 let first = *first.get_or_insert(found);
                 let case = format!("tilt {share} of the limit, {} contacts", n * n);

@@ -52,7 +52,7 @@ pub(in crate::recipes) fn run(extent: Extent) -> Vec<Row> {
         let mut random = Random(38);
         let mut rows = Vec::new();
         for (count, repeats) in sizes {
-            solver.forget_times();
+            solver.times.clear();
             let (mut worst, mut doubt, mut most_active): (f64, f64, usize) = (0.0, 0.0, 0);
             for _ in 0..*repeats {
                 let set = contacts(*count, &mut random);

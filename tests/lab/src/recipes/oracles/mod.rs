@@ -99,7 +99,7 @@ pub(super) struct Solver {
     name: SolverName,
     projecting: Projecting,
     pub(super) unsolved: usize,
-    times: Vec<f64>,
+    pub(super) times: Vec<f64>,
 }
 
 impl Solver {
@@ -135,11 +135,6 @@ impl Solver {
     ) -> Vector6 {
         let answer = self.project(metric, wish, rows);
         metric.mass_matrix_times(&(answer.acceleration - wish)) * K_H
-    }
-
-    /// Forgets the times so far.
-    pub(super) fn forget_times(&mut self) {
-        self.times.clear();
     }
 
     /// A row of this solver: the active set is that of this project's method.
