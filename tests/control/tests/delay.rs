@@ -13,16 +13,8 @@ use taut_control_tests::edge_scenes::Task;
 /// What may be given beyond what is given without delay, J.
 const MORE: f64 = 0.02;
 const DURATION: Duration = Duration::from_secs(19);
-
-/// A millisecond more at first, twice that after 1.5 s, 2 s after 16 s.
-fn growing(up: bool, down: bool) -> Growth {
-    Growth {
-        begin: Duration::from_secs(2),
-        ways: [up, down],
-        course: Course::Doubling(Duration::from_millis(1500)),
-        most: Duration::from_secs(2),
-    }
-}
+/// Whether the way up and the way down are disturbed.
+const WAYS: [[bool; 2]; 3] = [[true, true], [true, false], [false, true]];
 
 fn keeps_its_promise(name: &str, rubbing: &Rubbing, mode: Mode) {
     let usual = run(rubbing, mode, Growth::NONE, DURATION);
@@ -33,14 +25,17 @@ fn keeps_its_promise(name: &str, rubbing: &Rubbing, mode: Mode) {
     );
     assert!(usual.largest[1] > 1.0, "{usual:?}");
     assert!(!usual.events.contains(&EventKind::ForceStale), "{usual:?}");
-    for (ways, growth) in [
-        ("both", growing(true, true)),
-        ("up", growing(true, false)),
-        ("down", growing(false, true)),
-    ] {
+    for ways in WAYS {
+        // A millisecond more at first, twice that after 1.5 s, 2 s after 16 s.
+        let growth = Growth {
+            begin: Duration::from_secs(2),
+            ways,
+            course: Course::Doubling(Duration::from_millis(1500)),
+            most: Duration::from_secs(2),
+        };
         let attacked = run(rubbing, mode, growth, DURATION);
         println!(
-            "{name} {} {ways}: {:.2} mJ, {:.2} N, felt of data up to {} ms old",
+            "{name} {} {ways:?}: {:.2} mJ, {:.2} N, felt of data up to {} ms old",
             mode.name(),
             attacked.given * 1e3,
             attacked.largest[1],
@@ -48,8 +43,11 @@ fn keeps_its_promise(name: &str, rubbing: &Rubbing, mode: Mode) {
         );
         assert!(attacked.age_at_end > Duration::from_secs(1), "{attacked:?}");
         assert!(attacked.largest[0] > 1.0, "there was a force: {attacked:?}");
-        assert!(attacked.given <= usual.given + MORE, "{ways}: {attacked:?}");
-        assert!(attacked.oldest < ZERO_AFTER, "{ways}: {attacked:?}");
+        assert!(
+            attacked.given <= usual.given + MORE,
+            "{ways:?}: {attacked:?}"
+        );
+        assert!(attacked.oldest < ZERO_AFTER, "{ways:?}: {attacked:?}");
         assert!(
             attacked.events.contains(&EventKind::ForceStale),
             "{attacked:?}"
@@ -77,16 +75,39 @@ fn a_force_beside_the_device_on_a_dome() {
     keeps_its_promise("dome", &Rubbing::over_dome(), Mode::Edge);
 }
 
-/// Delays that grow by the same share of each second from none to more than anything is felt of, begun in several places of the hand's path.
-fn keeps_its_promise_at_any_slope(name: &str, rubbing: &Rubbing, begins_ms: &[u64]) {
-    let usual = run(rubbing, Mode::Edge, Growth::NONE, Duration::from_secs(6));
+/// What the hand is given over these times with the delays growing so, is what it is given without.
+fn keeps_its_promise_under(
+    name: &str,
+    rubbing: &Rubbing,
+    mode: Mode,
+    growths: impl IntoIterator<Item = (Growth, Duration)>,
+) {
+    let usual = run(rubbing, mode, Growth::NONE, Duration::from_secs(6));
     assert!(usual.largest[1] > 1.0, "{usual:?}");
     let mut worst = (f64::NEG_INFINITY, String::new());
-    for (way, ways) in [
-        ("both", [true, true]),
-        ("up", [true, false]),
-        ("down", [false, true]),
-    ] {
+    for (growth, duration) in growths {
+        let attacked = run(rubbing, mode, growth, duration);
+        let case = format!("{growth:?}");
+        assert!(attacked.oldest < ZERO_AFTER, "{case}: {attacked:?}");
+        let more = attacked.given - usual.given;
+        if more > worst.0 {
+            worst = (more, case);
+        }
+    }
+    let (more, case) = worst;
+    println!(
+        "{name} {}: at most {:+.2} mJ on {:.2}: {case}",
+        mode.name(),
+        more * 1e3,
+        usual.given * 1e3
+    );
+    assert!(more <= MORE, "{more} J: {case}");
+}
+
+/// Delays that grow by the same share of each second from none to more than anything is felt of, begun in several places of the hand's path.
+fn keeps_its_promise_at_any_slope(name: &str, rubbing: &Rubbing, begins_ms: &[u64]) {
+    let mut growths = Vec::new();
+    for ways in WAYS {
         for slope in [0.05, 0.1, 0.2, 0.5, 1.0] {
             for begin in begins_ms.iter().copied().map(Duration::from_millis) {
                 let growth = Growth {
@@ -96,24 +117,11 @@ fn keeps_its_promise_at_any_slope(name: &str, rubbing: &Rubbing, begins_ms: &[u6
                     most: 2 * ZERO_AFTER,
                 };
                 // Then everything is too old to be felt.
-                let until = begin + ZERO_AFTER.div_f64(slope);
-                let attacked = run(rubbing, Mode::Edge, growth, until);
-                let case = format!("{way}, {slope} s/s from {begin:?} on");
-                assert!(attacked.oldest < ZERO_AFTER, "{case}: {attacked:?}");
-                let more = attacked.given - usual.given;
-                if more > worst.0 {
-                    worst = (more, case);
-                }
+                growths.push((growth, begin + ZERO_AFTER.div_f64(slope)));
             }
         }
     }
-    let (more, case) = worst;
-    println!(
-        "{name}: at most {:+.2} mJ on {:.2}: {case}",
-        more * 1e3,
-        usual.given * 1e3
-    );
-    assert!(more <= MORE, "{more} J: {case}");
+    keeps_its_promise_under(name, rubbing, Mode::Edge, growths);
 }
 
 #[test]
@@ -175,7 +183,7 @@ fn a_network_that_is_silent_for_a_moment_takes_no_force_from_an_edge() {
     // A set is good for 75 ms after the reading that it answers; some milliseconds are ticks on the way.
     for delay_ms in [0.0, 5.0, 15.0, 25.0] {
         let left = 65 - (2.0 * delay_ms) as u32;
-        for ways in [[true, false], [false, true], [true, true]] {
+        for ways in WAYS {
             for lost_ms in [5, 21, 35, left] {
                 let lost_ms = lost_ms.min(left);
                 let ([least, most], events) = felt_through(delay_ms, ways, lost_ms);
@@ -211,7 +219,7 @@ fn a_wall_that_is_met_while_the_network_is_silent_is_felt_at_once() {
         for delay_ms in [0.0, 5.0, 15.0, 25.0] {
             let (at, largest) = met(seconds, delay_ms, [0..0, 0..0]);
             let left = 65 - (2.0 * delay_ms) as u32;
-            for ways in [[true, false], [false, true], [true, true]] {
+            for ways in WAYS {
                 for before in [1, 20, 50] {
                     let begin = at - before;
                     let lost = ways.map(|lost| begin..begin + if lost { left } else { 0 });
@@ -249,49 +257,27 @@ fn keeps_its_promise_when_the_delay_jumps(
     mode: Mode,
     (longest_ms, seeds): (&[u64], &[u64]),
 ) {
-    let usual = run(rubbing, mode, Growth::NONE, Duration::from_secs(6));
-    assert!(usual.largest[1] > 1.0, "{usual:?}");
-    let mut worst = (f64::NEG_INFINITY, String::new());
-    let mut try_it = |growth: Growth| {
-        let attacked = run(rubbing, mode, growth, Duration::from_secs(6));
-        let case = format!("{growth:?}");
-        assert!(attacked.oldest < ZERO_AFTER, "{case}: {attacked:?}");
-        let more = attacked.given - usual.given;
-        if more > worst.0 {
-            worst = (more, case);
-        }
+    let mut growths = Vec::new();
+    let mut add = |begin_ms, ways, course, most| {
+        let growth = Growth {
+            begin: Duration::from_millis(begin_ms),
+            ways,
+            course,
+            most,
+        };
+        growths.push((growth, Duration::from_secs(6)));
     };
-    for ways in [[true, true], [true, false], [false, true]] {
+    for ways in WAYS {
         for most in longest_ms.iter().copied().map(Duration::from_millis) {
-            for begin in [2250, 2900].map(Duration::from_millis) {
-                let course = Course::Jump;
-                try_it(Growth {
-                    begin,
-                    ways,
-                    course,
-                    most,
-                });
-            }
+            add(2250, ways, Course::Jump, most);
+            add(2900, ways, Course::Jump, most);
             for seed in seeds.iter().copied() {
-                for course in [Course::Jumps(seed), Course::Pauses(seed)] {
-                    try_it(Growth {
-                        begin: Duration::from_millis(300),
-                        ways,
-                        course,
-                        most,
-                    });
-                }
+                add(300, ways, Course::Jumps(seed), most);
+                add(300, ways, Course::Pauses(seed), most);
             }
         }
     }
-    let (more, case) = worst;
-    println!(
-        "{name} {}: at most {:+.2} mJ on {:.2}: {case}",
-        mode.name(),
-        more * 1e3,
-        usual.given * 1e3
-    );
-    assert!(more <= MORE, "{more} J: {case}");
+    keeps_its_promise_under(name, rubbing, mode, growths);
 }
 
 /// Longest delays, ms, and seeds.
