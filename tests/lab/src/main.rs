@@ -1,10 +1,6 @@
-//! Runs the recipes for every method and rate:
-//! `cargo run --release -p taut-lab -- [report] [--quick] [--out DIRECTORY] [--threads N] [--method NAME]... [--sweep NAME]... [--maps] [--fresh] [RECIPE...]`.
+//! The command of the laboratory: `cargo run --release -p taut-lab -- --help` says what it runs and writes.
 //!
-//! Prints the table and writes it, the CSV files and the charts. `report` (or `--report`) adds all sweeps and writes `report.html`, a page
-//! of everything. `--maps` runs the stability maps. `--threads` is the number of cores unless it is given. `--sweep NAME` runs that sweep, and recipes only where they are named. Results that are finished are kept in `done`
-//! beside the files, and not run again; `--fresh` runs everything. Exit code 1 where this project's own method fails at 1 kHz, or a study or
-//! a reference answer does, 2 where the arguments are wrong or a file cannot be written.
+//! Results that are finished are kept in `done` beside the files, and not run again unless `--fresh` says so.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
