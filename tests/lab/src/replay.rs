@@ -15,7 +15,6 @@
 
 use std::error::Error;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::PathBuf;
 
 use god_object::spatial::{angular, linear};
@@ -214,12 +213,6 @@ pub fn within_targets(found: &[[f64; 3]; 2]) -> bool {
     both.into_iter().all(|(found, target)| found <= target)
 }
 
-fn numbers<const N: usize>(fields: &str) -> Result<[f64; N], Box<dyn Error>> {
-    let numbers: Result<Vec<f64>, _> = fields.split(',').map(str::parse).collect();
-    let numbers: Result<[f64; N], _> = numbers?.try_into();
-    numbers.map_err(|_| format!("not {N} numbers: {fields}").into())
-}
-
 fn pose(numbers: &[f64]) -> Pose {
     let turn = Quaternion::new(numbers[3], numbers[4], numbers[5], numbers[6]);
     Pose::from_parts(
@@ -230,21 +223,21 @@ fn pose(numbers: &[f64]) -> Pose {
 
 /// What it was fitted to, and world from contour.
 fn registration(trial: &str) -> Result<(String, Pose), Box<dyn Error>> {
-    let text = fs::read_to_string(directory().join("registration.csv"))?;
-    let row = (text.lines()).find_map(|line| line.strip_prefix(trial)?.strip_prefix(','));
-    let row = row.ok_or_else(|| format!("registration.csv: no trial {trial}"))?;
-    let (by, fields) = row
-        .split_once(',')
-        .ok_or("registration.csv: a row is short")?;
-    Ok((by.to_owned(), pose(&numbers::<7>(fields)?)))
+    let rows = csv::Reader::from_path(directory().join("registration.csv"))?;
+    for row in rows.into_deserialize() {
+        let (of, by, place): (String, String, [f64; 7]) = row?;
+        if of == trial {
+            return Ok((by, pose(&place)));
+        }
+    }
+    Err(format!("registration.csv: no trial {trial}").into())
 }
 
 fn samples(trial: &str) -> Result<Vec<Sample>, Box<dyn Error>> {
-    let name = directory().join(format!("contour_{trial}.csv"));
-    let text = fs::read_to_string(name)?;
+    let rows = csv::Reader::from_path(directory().join(format!("contour_{trial}.csv")))?;
     let mut samples = Vec::new();
-    for line in text.lines().skip(1) {
-        let row = numbers::<14>(line)?;
+    for row in rows.into_deserialize() {
+        let row: [f64; 14] = row?;
         samples.push(Sample {
             time: row[0],
             pose: pose(&row[1..8]),
