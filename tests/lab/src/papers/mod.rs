@@ -162,7 +162,7 @@ fn driven(
     let step = |tick: u32| {
         let time = f64::from(tick) * TICK;
         let pose = device(tick);
-        if tick % every == 0 {
+        if tick.is_multiple_of(every) {
             method.update(time, &pose);
             method.publish(time);
         }
