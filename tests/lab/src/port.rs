@@ -95,18 +95,12 @@ mod tests {
     use god_object::spatial::linear;
 
     use super::*;
-    use crate::recipes::{Extent, all};
-
-    fn recipe(name: &str, case: &str) -> Recipe {
-        let mut recipes = all(Extent::Quick).into_iter();
-        let found = recipes.find(|recipe| recipe.name == name && recipe.case == case);
-        found.unwrap_or_else(|| panic!("no {name} {case}"))
-    }
+    use crate::recipes::{Extent, all, named};
 
     #[test]
     fn a_wall_that_is_met_at_a_metre_a_second_is_felt_as_it_is() {
         for case in ["0.05 m/s", "0.3 m/s", "1 m/s"] {
-            let recipe = recipe("R11", case);
+            let recipe = named(all(Extent::Quick), "R11", case);
             let right = &recipe.answer().wrenches;
             let felt = right_answer(&recipe);
             let off = right.iter().zip(&felt).map(|(a, b)| (a - b).norm());
@@ -117,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_force_that_ends_at_once_is_let_down_by_the_slew_limit() {
-        let recipe = recipe("R13", "end of a plate");
+        let recipe = named(all(Extent::Quick), "R13", "end of a plate");
         let change = |forces: &[Vector6]| {
             let changes = forces
                 .windows(2)

@@ -10,11 +10,11 @@
 use std::fs;
 use std::path::PathBuf;
 
-use god_object::spatial::{angular, linear};
 use god_object::{Coupling, GodObject, Settings, Vector6};
 
 use crate::clock::TICK;
 use crate::cpu_time::quantile;
+use crate::oracle;
 use crate::recipe::Recipe;
 use crate::store;
 
@@ -125,17 +125,11 @@ fn converge(recipe: &Recipe) -> Answer {
     let mut answer = Answer::exact(std::iter::empty());
     for steps in &STEPS[1..] {
         let fine = run(recipe, *steps);
-        let change = |part: fn(&Vector6) -> nalgebra::Vector3<f64>| {
-            let changes: Vec<f64> = coarse
-                .iter()
-                .zip(&fine)
-                .map(|(a, b)| (part(a) - part(b)).norm())
-                .collect();
-            quantile(&changes, 0.95)
-        };
+        let [force_error, torque_error] =
+            oracle::apart(&coarse, &fine).map(|changes| quantile(&changes, 0.95));
         answer = Answer {
-            force_error: change(linear),
-            torque_error: change(angular),
+            force_error,
+            torque_error,
             wrenches: fine.clone(),
             steps: *steps,
         };

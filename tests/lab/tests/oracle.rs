@@ -4,7 +4,7 @@ use god_object::Vector6;
 use god_object::spatial::{angular, linear};
 use taut_lab::oracle::{Fineness, POSE_EVERY, Table, follow, follow_from};
 use taut_lab::recipe::{Ideal, Recipe};
-use taut_lab::recipes::{Extent, all};
+use taut_lab::recipes::{Extent, all, named};
 
 /// Largest differences of force, N, and torque, N m.
 fn apart(one: &[Vector6], other: &[Vector6]) -> [f64; 2] {
@@ -26,9 +26,7 @@ fn is_found_again(name: &str, case: &str, samples: u32) {
         samples,
         ..Fineness::default()
     };
-    let mut recipes = all(Extent::Quick).into_iter();
-    let recipe = recipes.find(|recipe| recipe.name == name && recipe.case == case);
-    let recipe = recipe.unwrap_or_else(|| panic!("no {name}, {case}"));
+    let recipe = named(all(Extent::Quick), name, case);
     assert!(
         matches!(recipe.ideal, Ideal::Closed(_)),
         "{recipe:?} has a formula"

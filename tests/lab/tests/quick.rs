@@ -7,7 +7,7 @@ use taut_lab::measured::{Measured, TRAINING, judged};
 use taut_lab::method::{Method, Tuning};
 use taut_lab::outcome::{Outcome, reference_rows};
 use taut_lab::recipe::{Ideal, Line, Recipe};
-use taut_lab::recipes::{Extent, STUDIES, all};
+use taut_lab::recipes::{self, Extent, STUDIES, all};
 use taut_lab::report::verdict;
 use taut_lab::row::{Row, Verdict};
 
@@ -24,10 +24,7 @@ fn named(name: &str) -> Vec<Recipe> {
 }
 
 fn recipe(name: &str, case: &str) -> Recipe {
-    named(name)
-        .into_iter()
-        .find(|recipe| recipe.case == case)
-        .expect("a recipe of this case")
+    recipes::named(all(Extent::Quick), name, case)
 }
 
 /// What a method fails of the recipes of this name at a rate. What is open must still be missed: else the line is to be closed.

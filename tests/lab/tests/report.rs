@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use taut_lab::method::Method;
-use taut_lab::recipes::{Extent, all};
+use taut_lab::recipes::{Extent, all, named};
 use taut_lab::row::Verdict;
 use taut_lab::run::{Plan, Results};
 use taut_lab::store::Store;
@@ -180,12 +180,11 @@ fn a_trace_shows_the_fall_through_the_plate() {
 fn sweeps_name_recipes_that_are_there_and_settings_that_are_valid() {
     let recipes = all(Extent::Quick);
     for sweep in SWEEPS {
-        let Runs::Settings(named, variants) = sweep.runs else {
+        let Runs::Settings(cases, variants) = sweep.runs else {
             continue;
         };
-        for (name, case) in named {
-            let recipe = recipes.iter().find(|r| r.name == *name && r.case == *case);
-            let recipe = recipe.unwrap_or_else(|| panic!("{}: no {name}, {case}", sweep.name));
+        for (name, case) in cases {
+            let recipe = named(&recipes, name, case);
             for variant in variants() {
                 let fitted = recipe.scene.fitted(1.0 / f64::from(variant.rate));
                 let settings = (variant.settings)(fitted);

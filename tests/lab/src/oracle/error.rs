@@ -26,7 +26,7 @@ pub(super) fn variant(index: usize) -> Fineness {
 }
 
 /// Differences of force, N, and torque, N m, millisecond by millisecond.
-pub(super) fn apart(one: &[Vector6], other: &[Vector6]) -> [Vec<f64>; 2] {
+pub(crate) fn apart(one: &[Vector6], other: &[Vector6]) -> [Vec<f64>; 2] {
     let pairs = || one.iter().zip(other);
     [
         pairs().map(|(a, b)| linear(&(a - b)).norm()).collect(),

@@ -19,6 +19,7 @@ mod solid;
 mod table;
 
 pub use command::run as command;
+pub(crate) use error::apart;
 pub use rest::{Account, Fineness, Rest};
 pub use table::{POSE_EVERY, Table, of};
 

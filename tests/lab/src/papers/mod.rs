@@ -18,8 +18,7 @@ use god_object::{Pose, Vector6};
 
 use crate::clock::TICK;
 use crate::method::{HapticMethod, Method};
-use crate::recipe::Recipe;
-use crate::recipes::{Extent, all, large_bunnies};
+use crate::recipes::{Extent, all, large_bunnies, named};
 
 /// Half a side of cubes, and radius of balls, m.
 const HALF: f64 = 0.005;
@@ -84,10 +83,7 @@ const NOT_ESTABLISHED: [(&str, &str); 6] = [
 /// Every figure.
 pub fn figures() -> Vec<Figure> {
     let recipes = all(Extent::Quick);
-    let recipe = |name: &str, case: &str| -> &Recipe {
-        let found = recipes.iter().find(|r| r.name == name && r.case == case);
-        found.unwrap_or_else(|| panic!("no {name}, {case}"))
-    };
+    let recipe = |name, case| named(&recipes, name, case);
     let mut figures = point::figures(recipe("R09", "plate of 0.1 mm"));
     figures.extend(penalty::figures());
     figures.extend(virtual_coupling::figures());

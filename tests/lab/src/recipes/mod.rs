@@ -34,6 +34,8 @@ pub(crate) use bunny::large as large_bunnies;
 pub(crate) use oracles::SolverName;
 pub(crate) use oracles::many_contacts::random_contacts;
 
+use std::borrow::Borrow;
+
 use crate::recipe::Recipe;
 use crate::study::Study;
 
@@ -84,6 +86,17 @@ pub fn all(extent: Extent) -> Vec<Recipe> {
     .into_iter()
     .flat_map(|recipes| recipes(extent))
     .collect()
+}
+
+/// The one of these with this name and case.
+///
+/// # Panics
+///
+/// Where there is none.
+pub fn named<R: Borrow<Recipe>>(recipes: impl IntoIterator<Item = R>, name: &str, case: &str) -> R {
+    let is_it = |recipe: &R| (recipe.borrow().name, recipe.borrow().case.as_str()) == (name, case);
+    let found = recipes.into_iter().find(is_it);
+    found.unwrap_or_else(|| panic!("no recipe {name}, {case}"))
 }
 
 /// Every recipe that is no run along a path. A new one is one line here.

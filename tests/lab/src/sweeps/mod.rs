@@ -20,7 +20,7 @@ use crate::measure::Measure;
 use crate::measured::{Measured, judged};
 use crate::methods::GodObjectMethod;
 use crate::recipe::Recipe;
-use crate::recipes::Extent;
+use crate::recipes::{Extent, named};
 use crate::store::{Store, recipe_key};
 
 /// All, most telling first.
@@ -193,8 +193,7 @@ impl Sweep {
                 let tasks: Vec<(&Recipe, &Variant)> = names
                     .iter()
                     .flat_map(|(name, case)| {
-                        let recipe = recipes.iter().find(|r| r.name == *name && r.case == *case);
-                        let recipe = recipe.unwrap_or_else(|| panic!("no recipe {name}, {case}"));
+                        let recipe = named(recipes, name, case);
                         variants.iter().map(move |variant| (recipe, variant))
                     })
                     .collect();

@@ -14,7 +14,7 @@ use taut_proto::header::{HEADER_BYTES, TAG_BYTES};
 
 use super::{Case, Cost, Runs, Sweep};
 use crate::recipe::Recipe;
-use crate::recipes::{Extent, all};
+use crate::recipes::{Extent, all, named};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "wire",
@@ -47,11 +47,8 @@ fn cases(extent: Extent) -> Vec<Case> {
     for (name, case) in RECIPES {
         for bits in BITS {
             for rate in RATES {
-                let is_it = |recipe: &Recipe| recipe.name == name && recipe.case == case;
-                let recipe = all(extent).into_iter().find(is_it);
-                let recipe = recipe.unwrap_or_else(|| panic!("no recipe {name}, {case}"));
                 cases.push(Case {
-                    recipe: sent(recipe, bits, rate),
+                    recipe: sent(named(all(extent), name, case), bits, rate),
                     label: format!("{}, {rate} Hz", label(bits)),
                     rate: UPDATES,
                     cost: Some(bandwidth(bits, rate)),
@@ -129,8 +126,7 @@ mod tests {
 
     #[test]
     fn a_pose_is_held_until_the_next_is_sent() {
-        let is_it = |recipe: &Recipe| recipe.name == "R02";
-        let recipe = all(Extent::Quick).into_iter().find(is_it).expect("R02");
+        let recipe = named(all(Extent::Quick), "R02", "ball on a plane");
         // In the middle of the path the hand slides.
         let sent_at = recipe.ticks() / 8 * 4;
         let slow = sent(recipe, None, 250);
