@@ -1,8 +1,8 @@
 //! What collections brought, and how far they reach.
 
 use super::at::{At, Purpose, Surfaces};
-use super::row::{Known, jacobian};
 use super::kept::FEW;
+use super::row::{Known, jacobian};
 use super::{RowReduction, TOUCHING_REST_DISTANCES};
 use crate::constraint::{Collected, Contact};
 use crate::spatial::{Vector6, angular, linear};
