@@ -72,6 +72,7 @@ fn bandwidth(bits: Option<u32>, rate: u32) -> f64 {
 
 /// The recipe with its device as it arrives; the right answer stays that of the device itself.
 fn sent(recipe: Recipe, bits: Option<u32>, rate: u32) -> Recipe {
+    recipe.answer();
     let device = recipe.device;
     let rate = f64::from(rate);
     // A hundred-thousandth of a period more: a pose that is due now is not one of a period ago for a rounding.
@@ -122,6 +123,13 @@ mod tests {
             );
             assert!(turned <= 0.5 * TURN / counts, "{bits:?}: {turned} rad");
         }
+    }
+
+    #[test]
+    fn what_is_sent_is_held_to_the_answer_of_the_device_itself() {
+        let recipe = || named(all(Extent::Quick), "R10b", "bar past a pin");
+        let sent = sent(recipe(), Some(10), 60);
+        assert_eq!(sent.answer().wrenches, recipe().answer().wrenches);
     }
 
     #[test]

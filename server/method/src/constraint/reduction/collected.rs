@@ -85,7 +85,7 @@ impl RowReduction {
     }
 
     /// Adds a contact of the present pose to choose from where one of the motions violates it, world frame; whether it does. Of the others that a search for
-    /// the force came across a few become rows, as the device may go between its motions.
+    /// the force comes across a few become rows, and stay, as the device may go between its motions.
     pub(crate) fn offer_violated(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
@@ -93,6 +93,14 @@ impl RowReduction {
         purpose: Purpose,
         contact: &Contact,
     ) -> bool {
+        let is_for_force = purpose == Purpose::Force;
+        let mut known = self.known.iter_mut();
+        if let Some(row) = known.find(|row| row.contact.features == contact.features) {
+            if is_for_force {
+                row.idle = 0;
+            }
+            return false;
+        }
         let row = Known::of(contact, surfaces, &at.center());
         let (jacobian, nearer) = row.for_purpose(purpose);
         let gap = contact.gap.max(purpose.least_gap(at)) - nearer;
@@ -100,11 +108,8 @@ impl RowReduction {
             let violation = at.rest_distance - gap - jacobian.dot(motion);
             violation > at.tolerance // false for NaN
         };
-        if self.knows(&contact.features) {
-            return false;
-        }
         if !motions.iter().any(violated) {
-            if purpose == Purpose::Force && self.known.len() < FEW.min(self.room) {
+            if is_for_force && self.known.len() < FEW.min(self.room) {
                 self.add(row);
             }
             return false;
