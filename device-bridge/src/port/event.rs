@@ -254,7 +254,7 @@ pub(super) fn kind_of_fault(fault: &DeviceFault) -> (EventKind, f64) {
     }
 }
 
-/// The events of one tick, at most [`MAX_EVENTS_PER_TICK`]. No allocation.
+/// The events of one tick, at most `MAX_EVENTS_PER_TICK`. No allocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Events {
     list: [Option<SafetyEvent>; MAX_EVENTS_PER_TICK],
