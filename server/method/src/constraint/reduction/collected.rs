@@ -94,8 +94,7 @@ impl RowReduction {
         contact: &Contact,
     ) -> bool {
         let is_for_force = purpose == Purpose::Force;
-        let mut known = self.known.iter_mut();
-        if let Some(row) = known.find(|row| row.contact.features == contact.features) {
+        if let Some(row) = self.known_mut(&contact.features) {
             if is_for_force {
                 row.idle = 0;
             }

@@ -20,13 +20,9 @@ impl RowReduction {
         }
         self.now += 1;
         for k in 0..self.candidates.contacts.len() {
-            let contact = self.candidates.contacts[k];
-            match self
-                .known
-                .iter_mut()
-                .find(|row| row.contact.features == contact.features)
-            {
-                Some(row) => row.note_use(self.now),
+            let (contact, now) = (self.candidates.contacts[k], self.now);
+            match self.known_mut(&contact.features) {
+                Some(row) => row.note_use(now),
                 None => self.add(Known::of(&contact, surfaces, &at.center())),
             }
         }
@@ -35,9 +31,9 @@ impl RowReduction {
 
     /// A row holds the body in an answer that was found elsewhere: friction leads to others than the wish alone.
     pub(crate) fn use_row(&mut self, features: &FeaturePair) {
-        let mut rows = self.known.iter_mut();
-        if let Some(row) = rows.find(|row| row.contact.features == *features) {
-            row.note_use(self.now);
+        let now = self.now;
+        if let Some(row) = self.known_mut(features) {
+            row.note_use(now);
             row.holds = true;
         }
     }

@@ -271,6 +271,11 @@ impl RowReduction {
         least
     }
 
+    fn known_mut(&mut self, features: &FeaturePair) -> Option<&mut Known> {
+        let mut rows = self.known.iter_mut();
+        rows.find(|row| row.contact.features == *features)
+    }
+
     fn knows(&self, features: &FeaturePair) -> bool {
         self.known
             .iter()
