@@ -1,12 +1,13 @@
 //! Conforming contact in many variants, and bunnies: times, rows, force errors, and the worst row of each column.
-//! `cargo run --release -p taut-method-tests --example conforming_variants -- [--quick] [--case NAME] [--repeats N] [--seed N | --seeds N] [--hands N]`.
+//! `cargo run --release -p taut-method-tests --example conforming_variants -- [--quick] [--case NAME] [--repeats N] [--seed N | --seeds N] [--hands N]
+//! [--rounds N]`.
 //!
 //! Variants `v0`, `v1`, ... cover every two levels of two factors; others have names (`peg`, `peg-floor`, ...). `bunnies` and `motions` need
 //! the test data. Times are CPU time of the thread, us; of `--repeats` runs the median of each percentile is printed. `work` is what the counted work
 //! would take on a nominal machine, us: it is the same in every run. `--case` runs the cases whose
 //! name begins so; `--quick` runs coarser meshes, 2,000 triangles each, for a hundred updates. `--seeds N` runs the designs of the seeds 1 to N, without
 //! the named cases and the bunnies, and prints those rows alone whose force is off by more than 1 %.
-//! `--hands N` (default 4): of how many hands the bunnies' forces are judged.
+//! `--hands N` (default 4): of how many hands the bunnies' forces are judged. `--rounds N` (default 0): how often rows are linearised anew.
 
 #[path = "conforming_variants/bunnies.rs"]
 mod bunnies;
@@ -47,6 +48,8 @@ struct Arguments {
     seeds: u64,
     /// That slide a bunny, where its force is judged.
     hands: u64,
+    /// How often rows are linearised anew.
+    rounds: u32,
 }
 
 impl Arguments {
@@ -58,6 +61,7 @@ impl Arguments {
             seed: 1,
             seeds: 0,
             hands: 4,
+            rounds: 0,
         };
         let mut given = std::env::args().skip(1);
         while let Some(key) = given.next() {
@@ -77,8 +81,9 @@ impl Arguments {
                 "--seed" => read.seed = number()?,
                 "--seeds" => read.seeds = number()?,
                 "--hands" => read.hands = number()?.max(1),
+                "--rounds" => read.rounds = u32::try_from(number()?).unwrap_or(u32::MAX),
                 _ => {
-                    let keys = "--quick, --case, --repeats, --seed, --seeds or --hands";
+                    let keys = "--quick, --case, --repeats, --seed, --seeds, --hands or --rounds";
                     return Err(format!("{key}: give {keys}"));
                 }
             }
@@ -149,12 +154,12 @@ fn measured(
     for repeat in 0..arguments.repeats {
         // Runs are the same but for their times: the oracle is asked once.
         let stride = if repeat == 0 { stride } else { 0 };
-        outcomes.push(run(
-            variant,
-            &Course { steps, stride },
-            oracle,
-            thread_cpu_us,
-        ));
+        let course = Course {
+            steps,
+            stride,
+            implicit_rounds: arguments.rounds,
+        };
+        outcomes.push(run(variant, &course, oracle, thread_cpu_us));
     }
     let first = outcomes[0].clone();
     let values = COLUMNS.map(|(name, value)| {

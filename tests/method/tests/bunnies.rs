@@ -3,11 +3,11 @@
 use taut_method_tests::variants::bunnies::{SLIDES, load};
 use taut_method_tests::variants::measure::quantile;
 
-/// As many hands, since where one presses, a set in a hundred may lack a row, and another's lacks none.
-const HANDS: u64 = 4;
-/// Most that their sets are off by at the 98th and 99th percentile and in the worst, of the slow and the fast slide. The worst of fifty hands is
-/// 0.00 and 5.9 %.
-const BOUNDS: [[f64; 3]; 2] = [[1e-3, 1e-3, 1e-3], [1e-3, 1e-3, 0.02]];
+/// As many hands, since where one presses, a set in a thousand may lack a row, and another's lacks none.
+const HANDS: u64 = 12;
+/// Most that their sets are off by at the 99th percentile, but for one in a thousand, and in the worst, of the slow and the fast slide. Which set is the
+/// worst is chance: of a hundred hands it is off by 2.3 and 5.8 %, one set in 12,000 and one in 3,000 by more than 1 %.
+const BOUNDS: [[f64; 3]; 2] = [[1e-3, 1e-3, 0.03], [1e-3, 1e-3, 0.1]];
 
 /// Where a hand goes up to 3 mm in an update, the set has what a collection reaches that looks as far as its work allows, and what a search along the
 /// set's motions finds beyond. Without such a reach the forces of fifty hands were off by up to 8 and 97 %.
@@ -20,7 +20,7 @@ fn a_bunny_that_slides_over_another_is_felt_as_by_every_pair() {
     for (slide, bounds) in SLIDES.iter().zip(BOUNDS) {
         let errors = slide.errors(&slide.world(&bunny), HANDS);
         let at = |share| quantile(&errors, share);
-        let shown = [0.9, 0.98, 0.99, 1.0].map(at);
+        let shown = [0.9, 0.99, 0.999, 1.0].map(at);
         println!("{}: {} sets, off by {shown:?}", slide.name, errors.len());
         let kept = shown[1..]
             .iter()

@@ -10,6 +10,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use taut_method_tests::machined::{COMB_DEPTH, combs};
 use taut_method_tests::solids::{body, mesh, obstacle, world};
 use taut_scene::shapes::{Axis, box_with_hole, cuboid, cylinder, sphere};
+use taut_test_kit::random::Random;
 
 /// Updates of the god-object in milliseconds: 1000, 333 and 71 Hz. Forces come at 1 kHz.
 const PERIODS: [u32; 3] = [1, 3, 14];
@@ -284,4 +285,62 @@ fn a_ball_in_a_hollow_feels_the_facets_that_it_comes_to_in_time() {
         println!("{facets} facets: off by {worst:e} of {largest} N");
         assert!(largest > 0.8 && worst < 1e-9, "{facets}: {worst} N");
     }
+}
+
+/// A box and a meshed ball, turned anyhow, pass the edge of a table on straight ways, without touching it. A pair of features that faces before, and no more
+/// where its plane is crossed, is nothing to be led around.
+#[test]
+fn what_passes_an_edge_goes_straight() {
+    let table = mesh(cuboid([0.05, 0.05, 0.01]));
+    let edge = Pose::translation(-0.05, 0.0, -0.01);
+    let settings = Settings::for_size(0.02);
+    let mut numbers = Random(4);
+    let mut pushed = Vec::new();
+    let ways = 600;
+    for (shape, of_body) in [
+        ("box", cuboid([0.01, 0.012, 0.008])),
+        ("ball", sphere(0.01, 2)),
+    ] {
+        let held = body(mesh(of_body));
+        let world = Arc::new(World {
+            body: held.clone(),
+            obstacles: vec![obstacle("table", table.clone(), edge)],
+        });
+        for _ in 0..ways {
+            let turn = UnitQuaternion::from_scaled_axis(numbers.vector3() * PI);
+            // The table is on one side of a plane through its edge, the body so far off on the other, and its way lies in the plane.
+            let off = UnitQuaternion::from_scaled_axis(-Vector3::y() * (1.4 * numbers.unit()))
+                * Vector3::x();
+            let way =
+                UnitQuaternion::from_scaled_axis(off * numbers.signed()) * off.cross(&Vector3::y());
+            let corners = held.mesh.vertices().iter();
+            let nearest = corners.map(|p| (turn * p).coords.dot(&off));
+            let beside = 0.2e-3 + 1.5e-3 * numbers.unit();
+            let center = off * (beside - nearest.fold(0.0, f64::min));
+            let speed = 1.0 + 4.0 * numbers.unit();
+            let at = |along: f64| Pose::from_parts((center - way * along).into(), turn);
+            let from = -0.03;
+            let mut god_object =
+                GodObject::new(world.clone(), settings, at(from)).expect("a free start");
+            let mut aside = 0.0_f64;
+            for k in 1..=(0.06 / (speed * 1e-3)) as u32 {
+                god_object.step(&at(from + speed * 1e-3 * f64::from(k)), None);
+                let pose = god_object.pose();
+                let gone = pose.translation.vector - center;
+                let turned = turn.angle_to(&pose.rotation) * 0.01;
+                aside = aside.max(gone.cross(&way).norm()).max(turned);
+            }
+            if aside > 1e-9 {
+                pushed.push(format!(
+                    "{shape} {beside:.2e} beside at {speed:.1} m/s: {aside:.2e} m, off {off:?} way {way:?}"
+                ));
+            }
+        }
+    }
+    assert!(
+        pushed.is_empty(),
+        "{} of {}: {pushed:#?}",
+        pushed.len(),
+        2 * ways
+    );
 }

@@ -20,8 +20,8 @@ enum Core {
 }
 
 impl Separation {
-    /// That of two features of placed bodies.
-    pub(crate) fn of<'a>(
+    /// That of two features of placed bodies: world from body, world from obstacle.
+    pub fn of<'a>(
         features: &FeaturePair,
         (body, body_pose): (impl Into<Collider<'a>>, &Pose),
         (obstacle, obstacle_pose): (impl Into<Collider<'a>>, &Pose),

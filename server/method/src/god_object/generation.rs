@@ -27,11 +27,9 @@ pub(super) const LEADING_MOTIONS: usize = 2;
 const MAX_ADDED: u32 = 24;
 
 impl GodObject {
-    /// Of which obstacles rows are chosen: of meshes. Exact primitives have few; the paper's cone has every touching contact; and rows that are
-    /// re-linearised are needed elsewhere than where they are chosen.
+    /// Of which obstacles rows are chosen: of meshes. Exact primitives have few, and the paper's cone has every touching contact.
     pub(super) fn chosen(world: &World, settings: &Settings) -> Vec<bool> {
-        let linear = settings.look_ahead && settings.implicit_rounds == 0;
-        let meshes = linear && world.body.primitive.is_none();
+        let meshes = settings.look_ahead && world.body.primitive.is_none();
         let obstacles = world.obstacles.iter();
         obstacles.map(|o| meshes && o.primitive.is_none()).collect()
     }
@@ -68,15 +66,19 @@ impl GodObject {
         let motion = [*unconstrained];
         self.with_reduction(|this, reduction, at| {
             let work = &mut report.work;
-            this.answers(reduction, at, &motion, Purpose::Motion, work);
+            reduction.bring_back_passed();
+            let mut answers = this.answers(reduction, at, &motion, Purpose::Motion, work);
             if reduction.is_outdated() {
                 // Of the present pose, within the distance of the last collection.
                 this.collect_candidates(reduction, at, this.collected_within, work);
-                this.answers(reduction, at, &motion, Purpose::Motion, work);
+                answers = this.answers(reduction, at, &motion, Purpose::Motion, work);
             }
             let of = (at, &this.surfaces(None) as &dyn Surfaces);
             if reduction.meet_corners(of, unconstrained, Purpose::Motion, |way| *way, work) {
-                this.answers(reduction, at, &motion, Purpose::Motion, work);
+                answers = this.answers(reduction, at, &motion, Purpose::Motion, work);
+            }
+            if let Some(answer) = answers.pop() {
+                reduction.set_passed_aside(of, (unconstrained, answer), work);
             }
         });
         self.write_set();

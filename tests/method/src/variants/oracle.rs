@@ -1,10 +1,13 @@
 //! The projection on every facing pair within reach, as the answer that a choice of rows is held against.
 
 use god_object::collision::{CollisionWorkspace, Work};
-use god_object::constraint::{Contact, Feature, collect_contacts, contact_jacobian};
-use god_object::quasi_statics::{HalfSpace, Metric, Projector, SolverKind};
+use god_object::constraint::{Contact, Feature, Separation, collect_contacts, contact_jacobian};
+use god_object::quasi_statics::{HalfSpace, Metric, ProjectionStatus, Projector, SolverKind};
 use god_object::spatial::{angular, at_reference_point, linear, pose_difference};
-use god_object::{GodObject, Mesh, Pose, Settings, Vector6, World};
+use god_object::{
+    ConstraintSet, Coupling, GodObject, Mesh, NonPenetrationConstraint, Pose, Settings, Surface,
+    Vector6, World,
+};
 use nalgebra::{Point3, Vector3};
 
 /// Most facing pairs within reach.
@@ -52,16 +55,7 @@ impl Oracle {
         let settings = god_object.settings();
         let body = &world.body;
         let at = at_reference_point(god_object.pose(), &body.reference_point);
-        let difference = pose_difference(
-            &at_reference_point(device, &body.reference_point),
-            &at,
-            &Vector3::zeros(),
-        );
-        // No point moves farther than this: a pair farther apart cannot hold anything.
-        let reach = linear(&difference).norm()
-            + god_object.radius() * angular(&difference).norm()
-            + 2.0 * settings.rest_distance;
-        self.collect(world, god_object, reach);
+        let difference = self.collect(world, god_object, device);
         let center = Point3::from(at.translation.vector);
         let wanted = difference * settings.k_s;
         let metric = body
@@ -111,7 +105,69 @@ impl Oracle {
         }
     }
 
-    fn collect(&mut self, world: &World, god_object: &GodObject, reach: f64) {
+    /// The same for the wrench of a coupling that has no history, with rows that are linearised anew where the settings say so. Obstacles stand still.
+    pub fn compare_wrenches(
+        &mut self,
+        world: &World,
+        god_object: &GodObject,
+        device: &Pose,
+    ) -> Difference {
+        self.collect(world, god_object, device);
+        let placed: Vec<&Pose> = god_object.obstacle_poses().collect();
+        let row = |contact: &Contact| {
+            let index = usize::from(contact.features.obstacle);
+            NonPenetrationConstraint {
+                features: contact.features,
+                point: contact.point_on_obstacle,
+                normal: contact.normal,
+                gap: contact.gap,
+                separation: Separation::of(
+                    &contact.features,
+                    (&world.body, god_object.pose()),
+                    (&world.obstacles[index], placed[index]),
+                ),
+                obstacle_displacement: Vector3::zeros(),
+                shading_normal: None,
+            }
+        };
+        let published = || {
+            let rows = god_object.constraint_set().constraints.iter();
+            rows.map(|row| NonPenetrationConstraint {
+                obstacle_displacement: Vector3::zeros(),
+                shading_normal: None,
+                ..*row
+            })
+        };
+        let is_new = |contact: &&Contact| {
+            let mut rows = god_object.constraint_set().constraints.iter();
+            !rows.any(|row| row.features == contact.features)
+                && !is_parted(world, god_object, contact)
+        };
+        let all = self.contacts.iter().filter(is_new).map(row);
+        let mut plain = world.clone();
+        (plain.obstacles.iter_mut()).for_each(|obstacle| obstacle.surface = Surface::default());
+        let full = wrench(&plain, god_object, device, published().chain(all).collect());
+        let chosen = wrench(&plain, god_object, device, published().collect());
+        let size =
+            |wrench: &Vector6| linear(wrench).norm() + angular(wrench).norm() / god_object.radius();
+        Difference {
+            relative: size(&(chosen - full)) / size(&full).max(LEAST_FORCE),
+            pairs: self.contacts.len(),
+        }
+    }
+
+    /// Finds every pair that can hold the body on its way to the device; that way.
+    fn collect(&mut self, world: &World, god_object: &GodObject, device: &Pose) -> Vector6 {
+        let reference_point = &world.body.reference_point;
+        let difference = pose_difference(
+            &at_reference_point(device, reference_point),
+            &at_reference_point(god_object.pose(), reference_point),
+            &Vector3::zeros(),
+        );
+        // No point moves farther than this: a pair farther apart cannot hold anything.
+        let reach = linear(&difference).norm()
+            + god_object.radius() * angular(&difference).norm()
+            + 2.0 * god_object.settings().rest_distance;
         self.contacts.clear();
         let placed = world.obstacles.iter().zip(god_object.obstacle_poses());
         for (index, (obstacle, pose)) in placed.enumerate() {
@@ -131,6 +187,7 @@ impl Oracle {
             );
             assert!(!collected.truncated, "the oracle holds every pair");
         }
+        difference
     }
 }
 
@@ -180,6 +237,27 @@ fn is_in_cone(mesh: &Mesh, pose: &Pose, feature: Feature, direction: &Vector3<f6
         }
         _ => false,
     }
+}
+
+/// What a coupling without a history makes of these rows.
+fn wrench(
+    world: &World,
+    god_object: &GodObject,
+    device: &Pose,
+    mut rows: Vec<NonPenetrationConstraint>,
+) -> Vector6 {
+    rows.sort_unstable_by_key(|row| row.features);
+    let settings = Settings {
+        max_constraints: rows.len(),
+        ..*god_object.settings()
+    };
+    let mut set = ConstraintSet::with_capacity(rows.len());
+    set.sequence = 1;
+    set.god_object_pose = *god_object.pose();
+    set.constraints = rows;
+    let output = Coupling::new(world, &settings).step(0.0, device, &set);
+    assert_eq!(output.status, ProjectionStatus::Solved);
+    output.wrench
 }
 
 struct Row {

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use crate::constraint::Contact;
 use crate::geometry::Mesh;
 use crate::quasi_statics::Metric;
-use crate::spatial::Pose;
+use crate::spatial::{Pose, Vector6, advance_pose};
 use crate::world::World;
 
 /// Where an obstacle is, and whether its rows are chosen: of exact primitives, which have few, every pair is a row, given from outside.
@@ -37,6 +37,16 @@ impl At {
     /// G, world.
     pub(crate) fn center(&self) -> Point3<f64> {
         Point3::from(self.reference.translation.vector)
+    }
+
+    /// The same where a motion has brought the body.
+    pub(super) fn moved_by(&self, motion: &Vector6) -> Self {
+        let reference = advance_pose(&self.reference, motion, 1.0);
+        Self {
+            pose: reference * self.reference.inverse() * self.pose,
+            reference,
+            ..self.clone()
+        }
     }
 
     /// An obstacle's mesh, and the world from it.

@@ -108,7 +108,10 @@ impl RowReduction {
             violation > at.tolerance // false for NaN
         };
         if !motions.iter().any(violated) {
-            if is_for_force && self.known.len() < FEW.min(self.room) {
+            let few = self.known.len() < FEW.min(self.room);
+            // Between conforming surfaces there are many, and none of them is felt.
+            let conforms = self.conforms(at, usize::from(contact.features.obstacle));
+            if is_for_force && few && !conforms {
                 self.add(row);
             }
             return false;

@@ -60,7 +60,7 @@ impl RowReduction {
         ways.any(|way| self.bring_corners_back(of, &way, work))
     }
 
-    fn complete_alone(
+    pub(super) fn complete_alone(
         &mut self,
         of: (&At, &dyn Surfaces),
         motion: &Vector6,
@@ -129,17 +129,14 @@ impl RowReduction {
                 implied: row.implied,
                 ..Known::of(&contact, surfaces, &at.center())
             });
-            if self.is_full() {
-                self.note_dropped(&row);
-            } else {
-                self.known.push(row);
-            }
+            self.put_known(row);
         }
         changed || !self.corners.replaced.is_empty()
     }
 
     /// The candidates are again what was collected.
     pub(super) fn forget_corners(&mut self) {
+        self.bring_back_passed();
         for (k, collected) in self.corners.replaced.drain(..) {
             self.candidates.exchange(k as usize, collected);
         }

@@ -37,6 +37,7 @@ mod met;
 #[cfg(test)]
 mod met_tests;
 mod neighbours;
+mod passed;
 mod row;
 
 use arrayvec::ArrayVec;
@@ -51,6 +52,7 @@ use crate::spatial::{Pose, Vector6};
 use crate::world::World;
 use candidates::Candidates;
 use corners::Corners;
+use passed::Passed;
 use row::{Known, face, felt, jacobian};
 
 /// Candidates that searches may add to those that were collected.
@@ -75,6 +77,7 @@ pub(crate) struct RowReduction {
     projector: Projector,
     candidates: Candidates,
     corners: Corners,
+    passed: Passed,
     known: Vec<Known>,
     /// Most rows known at a time: as many as the set has room for.
     room: usize,
@@ -107,6 +110,7 @@ impl RowReduction {
             projector: Projector::new(SolverKind::ActiveSet, most),
             candidates: Candidates::with_capacity(candidates + SEARCHED),
             corners: Corners::with_capacity(MAX_ROWS, candidates + SEARCHED),
+            passed: Passed::default(),
             known: Vec::with_capacity(MAX_ROWS),
             room: MAX_ROWS.min(candidates),
             now: 0,
@@ -148,6 +152,7 @@ impl RowReduction {
         work: &mut Work,
     ) {
         self.error = 0.0;
+        self.bring_back_passed();
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let mut left = ArrayVec::<FeaturePair, MAX_FOLLOWED>::new();
         self.known.retain_mut(|row| {
