@@ -8,7 +8,9 @@ use taut_method_tests::variants::measure::{Course, run};
 use taut_method_tests::variants::oracle::Oracle;
 use taut_method_tests::variants::scene::VariantScene;
 use taut_method_tests::variants::shapes::Tessellation;
-use taut_method_tests::variants::{Feel, Fit, Motion, Moving, Variant, covering, dense_peg};
+use taut_method_tests::variants::{
+    Feel, Fit, Motion, Moving, Variant, covering, crowned_plate, dense_peg,
+};
 
 /// Triangles of a mesh: few enough for debug builds.
 const TRIANGLES: u32 = 300;
@@ -85,6 +87,32 @@ fn rows_that_are_linearised_anew_are_few_and_have_the_force_of_all() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Thousands of vertices above a half-space, of which few hold the plate. With each as a row sets of a thousand lacked some.
+#[test]
+fn rows_of_a_dense_plate_on_a_half_space_are_few_and_have_the_force_of_all() {
+    let course = Course {
+        steps: 100,
+        stride: 5,
+        ..Course::default()
+    };
+    for motion in [Motion::Rest, Motion::Slide, Motion::Turn, Motion::Land] {
+        let variant = Variant {
+            motion,
+            ..crowned_plate("half-space", 360)
+        };
+        let outcome = run(&variant, &course, &mut Oracle::default(), || 0.0);
+        let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+        let (error, rows) = (most(&outcome.errors), most(&outcome.rows));
+        println!("{motion:?}: {error}, {rows} rows of {}", outcome.pairs);
+        assert!(error <= 1e-3 && rows <= 160.0, "{motion:?}: {error} {rows}");
+        assert_eq!(
+            [outcome.truncated, outcome.penetrations, outcome.failures],
+            [0; 3],
+            "{motion:?}"
+        );
+    }
 }
 
 /// A peg in its hole on an end stop, coarse enough for a test.

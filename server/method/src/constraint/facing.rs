@@ -17,9 +17,10 @@ use super::collect::triangle_of;
 use super::cones::{LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE};
 use super::element::{Cone, Element, Face, Frame, Placed, Point, Row, Segment, Skin};
 use super::foot::past_end;
+use super::piece::{Triangle, elements_of};
 use super::reentrant::{covers_outline, covers_way};
-use super::{Contact, FeaturePair};
-use crate::collision::Placement;
+use super::{Contact, Feature, FeaturePair};
+use crate::collision::{Collider, Placement};
 use crate::geometry::Mesh;
 
 /// Segments at a smaller angle are parallel, as its sine: their ends stand for them.
@@ -251,20 +252,47 @@ impl<'a> Facing<'a> {
             reach,
         }
     }
+}
 
-    /// The contact between two features by their names, when they face each other here.
-    pub(super) fn features(&self, features: &FeaturePair) -> Option<Contact> {
-        let (body, obstacle) = (self.body, self.obstacle);
-        let a = body.triangle(triangle_of(body.mesh, features.on_body)?);
-        let b = obstacle.triangle(triangle_of(obstacle.mesh, features.on_obstacle)?);
-        let mut found = None;
-        let (on_body, on_obstacle) = (
-            a.element(features.on_body)?,
-            b.element(features.on_obstacle)?,
-        );
-        rows(&on_body, &on_obstacle, &self.reach, &mut |row| {
-            found = Some(row.contact(self.obstacle_index, Some(&b)));
+/// The contact between two features by their names, when they face each other here, in the obstacle's frame.
+pub(super) fn contact_of(
+    features: &FeaturePair,
+    (body, obstacle): (&Collider<'_>, &Collider<'_>),
+    placement: &Placement,
+    reach: &Reach,
+) -> Option<Contact> {
+    let (on_body, on_obstacle) = (features.on_body, features.on_obstacle);
+    let mut found = None;
+    for_named(body, Frame(Some(placement)), on_body, |x, _| {
+        for_named(obstacle, Frame(None), on_obstacle, |y, triangle| {
+            rows(x, y, reach, &mut |row| {
+                if row.features == [on_body, on_obstacle] {
+                    found = Some(row.contact(features.obstacle, triangle));
+                }
+            });
         });
-        found
+    });
+    found
+}
+
+/// Calls `each` for what a feature is part of: an element of a triangle, with that, or each of a primitive, of which rows say what features they are of.
+fn for_named(
+    collider: &Collider<'_>,
+    frame: Frame<'_>,
+    feature: Feature,
+    mut each: impl FnMut(&Element, Option<&Triangle>),
+) {
+    match *collider {
+        Collider::Mesh(mesh) => {
+            let triangle = triangle_of(mesh, feature).map(|t| Placed { mesh, frame }.triangle(t));
+            let element = (triangle.as_ref()).and_then(|triangle| triangle.element(feature));
+            if let Some(element) = element {
+                each(&element, triangle.as_ref());
+            }
+        }
+        Collider::Primitive(primitive) => {
+            let elements = elements_of(primitive, frame);
+            elements.iter().for_each(|element| each(element, None));
+        }
     }
 }

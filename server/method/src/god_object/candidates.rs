@@ -20,11 +20,9 @@ impl GodObject {
         let share = self.share();
         let (mut left, mut even) = (self.settings.look_ahead_pairs, None);
         self.note_order(at);
+        let mut of_primitives = 0;
         for place in 0..self.order.len() {
             let index = self.order[place];
-            if !at.places[index].chosen {
-                continue;
-            }
             let pairs = if left < share {
                 let even = even.get_or_insert_with(|| self.even_share(at, distance));
                 share.min(left.max(*even))
@@ -36,9 +34,14 @@ impl GodObject {
             self.looked_at[index] = collected.looked_at;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
             reduction.offer(at, index, &self.contacts, &collected);
+            if !at.places[index].meshes {
+                of_primitives += collected.looked_at;
+                reduction.take_nearest((at, &self.surfaces(None)), index);
+            }
         }
+        self.afford_look_ahead(distance, of_primitives);
         // Known rows may be nearer than what a collection that was given up has found.
-        let gap_min = reduction.gap_min(at, work).min(self.given.gap_min);
+        let gap_min = reduction.gap_min(at, work);
         self.set.gap_min = self.set.gap_min.min(gap_min);
     }
 
@@ -49,23 +52,19 @@ impl GodObject {
         let looked_at = &self.looked_at;
         self.order.sort_unstable_by(|a, b| {
             let needed = looked_at[*a].cmp(&looked_at[*b]);
-            needed.then_with(|| off(*a).total_cmp(&off(*b)))
+            let nearer = needed.then_with(|| off(*a).total_cmp(&off(*b)));
+            nearer.then(a.cmp(b))
         });
     }
 
     /// Most pairs to look at for one obstacle, whichever comes first: what those do not need that needed less last time is the others'.
     fn share(&self) -> u64 {
         let all = self.settings.look_ahead_pairs;
-        let chosen = || {
-            let both = self.places.iter().zip(&self.looked_at);
-            both.filter(|(place, _)| place.chosen)
-                .map(|(_, pairs)| *pairs)
-        };
         let mut share = 1;
         loop {
-            let less = chosen().filter(|pairs| *pairs < share);
+            let less = self.looked_at.iter().filter(|pairs| **pairs < share);
             let (count, spent) = less.fold((0, 0), |(n, sum), pairs| (n + 1, sum + pairs));
-            let others = (chosen().count() as u64).saturating_sub(count).max(1);
+            let others = (self.looked_at.len() as u64).saturating_sub(count).max(1);
             let larger = all.saturating_sub(spent) / others;
             if larger <= share {
                 return share;
@@ -77,12 +76,10 @@ impl GodObject {
     /// Most pairs to look at for each of the obstacles that may have some within `distance`, m, if all had the same.
     fn even_share(&self, at: &At, distance: f64) -> u64 {
         let near = |index: &usize| {
-            let (obstacle, pose) = at.obstacle(*index);
-            let placement = Placement::of(&at.pose, pose);
-            !placement.is_beyond(distance, &at.world.body.mesh, obstacle)
+            let [(body, body_pose), (obstacle, pose)] = at.colliders(*index);
+            !Placement::of(body_pose, pose).is_beyond(distance, body, obstacle)
         };
-        let chosen = (0..at.places.len()).filter(|index| at.places[*index].chosen);
-        let count = chosen.filter(near).count() as u64;
+        let count = (0..at.places.len()).filter(near).count() as u64;
         self.settings.look_ahead_pairs / count.max(1)
     }
 
@@ -94,11 +91,11 @@ impl GodObject {
         (distance, pairs): (f64, u64),
         work: &mut Work,
     ) -> Collected {
-        let (obstacle, pose) = at.obstacle(index);
+        let [body, obstacle] = at.colliders(index);
         self.contacts.clear();
         collect_bounded(
-            ((&at.world.body.mesh).into(), &at.pose),
-            (obstacle.into(), pose),
+            body,
+            obstacle,
             u16::try_from(index).unwrap_or(u16::MAX),
             distance,
             pairs,

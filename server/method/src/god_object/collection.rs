@@ -1,5 +1,5 @@
-//! The constraint set of the present pose: every pair of features that face each other within a distance, of the obstacles whose rows are
-//! not chosen ([`generation`](super::generation)).
+//! The constraint set of the present pose: rows that are chosen ([`generation`](super::generation)), or every pair of features that face each other
+//! within a distance.
 
 use std::sync::Arc;
 
@@ -9,13 +9,13 @@ use super::GodObject;
 use super::placed_obstacle::{Ahead, PlacedObstacle};
 use crate::collision::Work;
 use crate::constraint::{
-    Contact, MAX_ROWS, NonPenetrationConstraint, Separation, Surfaces, collect_contacts,
+    Contact, NonPenetrationConstraint, Separation, Surfaces, collect_contacts,
 };
 use crate::spatial::{Pose, pose_difference};
 use crate::surface::ShadingNormals;
 use crate::world::World;
 
-/// Every row of some obstacles, as many as there is room for: the nearest, whichever obstacle they are of.
+/// Every row, as many as there is room for: the nearest, whichever obstacle they are of.
 #[derive(Debug)]
 pub(super) struct GivenRows {
     rows: Vec<NonPenetrationConstraint>,
@@ -37,10 +37,6 @@ impl GivenRows {
             truncated: false,
             complete_within: f64::INFINITY,
         }
-    }
-
-    pub(super) fn rows(&self) -> &[NonPenetrationConstraint] {
-        &self.rows
     }
 
     fn clear(&mut self, within: f64) {
@@ -69,18 +65,9 @@ impl GodObject {
         self.collected_within = distance;
         self.searched.clear();
         self.note_places();
-        self.collect_given(distance, work);
         if !self.refresh(distance, work) {
-            self.write_given();
-        }
-    }
-
-    /// Collects to a longer distance what is not chosen; the set is written where nothing else is.
-    pub(super) fn look_farther(&mut self, distance: f64, work: &mut Work) {
-        if self.reduction.is_none() {
-            self.collect(distance, work);
-        } else if self.places.iter().any(|place| !place.chosen) {
             self.collect_given(distance, work);
+            self.write_given();
         }
     }
 
@@ -100,7 +87,7 @@ impl GodObject {
                 &Vector3::zeros(),
             ));
             place.pose = placed.pose;
-            if let Some(reduction) = self.reduction.as_mut().filter(|_| place.chosen) {
+            if let Some(reduction) = &mut self.reduction {
                 reduction.note_moved(index, path);
             }
         }
@@ -119,26 +106,16 @@ impl GodObject {
         for (index, (place, placed)) in places.iter_mut().zip(&self.obstacles).enumerate() {
             if placed.is_with_body() {
                 place.pose = placed.pose;
-            } else if place.chosen {
+            } else {
                 reduction.note_moved(index, path);
             }
         }
     }
 
-    /// Every pair within `distance` of the obstacles whose rows are not chosen.
+    /// Every pair within `distance`, m.
     fn collect_given(&mut self, distance: f64, work: &mut Work) {
-        let pairs_before = work.triangle_pairs + work.feature_pairs;
         self.given.clear(distance);
-        let most = self.settings.max_constraints;
-        let room = if self.reduction.is_some() {
-            most.saturating_sub(MAX_ROWS).max(most / 2)
-        } else {
-            most
-        };
         for index in 0..self.obstacles.len() {
-            if self.reduction.is_some() && self.places[index].chosen {
-                continue;
-            }
             self.contacts.clear();
             let collected = collect_contacts(
                 &self.world.body,
@@ -159,12 +136,7 @@ impl GodObject {
                 let row = self.row_of(index, &self.contacts[k]);
                 self.given.rows.push(row);
             }
-            self.given.keep_nearest(room);
-        }
-        let looked_at = work.triangle_pairs + work.feature_pairs - pairs_before;
-        self.afford_look_ahead(distance, looked_at);
-        if let (Some(at), Some(reduction)) = (self.place(), &mut self.reduction) {
-            reduction.give(&at, &self.given.rows, most);
+            self.given.keep_nearest(self.settings.max_constraints);
         }
     }
 

@@ -27,16 +27,10 @@ pub(super) const LEADING_MOTIONS: usize = 2;
 const MAX_ADDED: u32 = 24;
 
 impl GodObject {
-    /// Of which obstacles rows are chosen: of meshes. Exact primitives have few, and the paper's cone has every touching contact.
-    pub(super) fn chosen(world: &World, settings: &Settings) -> Vec<bool> {
-        let meshes = settings.look_ahead && world.body.primitive.is_none();
-        let obstacles = world.obstacles.iter();
-        obstacles.map(|o| meshes && o.primitive.is_none()).collect()
-    }
-
+    /// The choice of rows; `None` for the paper's cone, which has every touching contact.
     pub(super) fn reduction_for(world: &World, settings: &Settings) -> Option<Box<RowReduction>> {
-        let any = Self::chosen(world, settings).contains(&true);
-        any.then(|| Box::new(RowReduction::with_capacity(settings.max_constraints, world)))
+        let room = settings.max_constraints;
+        (settings.look_ahead).then(|| Box::new(RowReduction::with_capacity(room, world)))
     }
 
     /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
@@ -52,7 +46,7 @@ impl GodObject {
             let (moved, within) = (reduction.moved(this.radius), reduction.served());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;
-            this.set.gap_min = reduction.gap_min(at, work).min(this.given.gap_min);
+            this.set.gap_min = reduction.gap_min(at, work);
             if !reaches || reduction.is_outdated() {
                 this.collect_candidates(reduction, at, distance, work);
             }
@@ -294,12 +288,10 @@ impl GodObject {
         self.set.sequence += 1;
         self.set.published = None;
         self.set.god_object_pose = self.pose;
-        self.set.truncated = reduction.truncated() || self.given.truncated;
+        self.set.truncated = reduction.truncated();
         self.set.reduction_error = reduction.error();
-        let within = reduction.known_within(self.radius);
-        self.set.complete_within = within.min(self.given.complete_within);
+        self.set.complete_within = reduction.known_within(self.radius);
         self.set.constraints.clear();
-        self.set.constraints.extend_from_slice(self.given.rows());
         for contact in reduction.contacts() {
             let index = usize::from(contact.features.obstacle);
             let row = self.row_of(index, contact);

@@ -58,7 +58,8 @@ impl GodObject {
         let leading = &answers[..answers.len().min(LEADING_MOTIONS)];
         let mut any = false;
         for index in 0..at.places.len() {
-            if !at.places[index].chosen {
+            // Of a primitive every pair was collected.
+            if !at.places[index].meshes {
                 continue;
             }
             let motions = match (reduction.conforms(at, index), purpose) {

@@ -77,13 +77,13 @@ pub struct GodObject {
     pub(super) affordable: f64,
     /// Finds rows as they are needed; `None` where every pair is collected.
     pub(super) reduction: Option<Box<RowReduction>>,
-    /// Where each obstacle is, and whether its rows are chosen.
+    /// Where each obstacle is.
     pub(super) places: Arc<[Place]>,
     /// Pairs that the last collection of each obstacle looked at.
     pub(super) looked_at: Vec<u64>,
     /// The obstacles, those first whose last collection looked at the fewest pairs.
     pub(super) order: Vec<usize>,
-    /// Rows of those obstacles that are not chosen from.
+    /// Every row, where none are chosen.
     pub(super) given: GivenRows,
 }
 
@@ -107,10 +107,9 @@ impl GodObject {
             places: world
                 .obstacles
                 .iter()
-                .zip(Self::chosen(&world, &settings))
-                .map(|(obstacle, chosen)| Place {
+                .map(|obstacle| Place {
                     pose: obstacle.pose,
-                    chosen,
+                    meshes: world.body.primitive.is_none() && obstacle.primitive.is_none(),
                 })
                 .collect(),
             looked_at: vec![0; obstacles],
@@ -238,8 +237,8 @@ impl GodObject {
         }
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
         let published = self.published_distance(&update);
-        if self.collected_within < published {
-            self.look_farther(published, &mut report.work);
+        if self.reduction.is_none() && self.collected_within < published {
+            self.collect(published, &mut report.work);
         }
         let difference = self
             .turn

@@ -27,6 +27,8 @@ pub enum Fit {
     PlateInSlot,
     /// A plate on a table.
     PlateOnTable,
+    /// A plate on a half-space.
+    PlateOnHalfSpace,
 }
 
 /// How the obstacle's surface feels.
@@ -118,6 +120,18 @@ pub fn dense_peg(name: &str) -> Variant {
     }
 }
 
+/// A plate of so many facets around, crowned, that slides on a half-space.
+pub fn crowned_plate(name: &str, facets: u32) -> Variant {
+    let cut = Tessellation { facets, bands: 1 };
+    Variant {
+        fit: Fit::PlateOnHalfSpace,
+        body: cut,
+        obstacle: Tessellation { facets: 12, ..cut },
+        crown: 22e-6,
+        ..dense_peg(name)
+    }
+}
+
 /// The cases that have names of their own.
 pub fn named() -> Vec<Variant> {
     let long = Tessellation {
@@ -179,6 +193,7 @@ pub fn named() -> Vec<Variant> {
             motion: Motion::Rest,
             ..dense_peg("plate-crowned")
         },
+        crowned_plate("plate-half-space", 1440),
     ]
 }
 

@@ -49,8 +49,6 @@ impl Default for Oracle {
 
 impl Oracle {
     /// Compares the rows that were published with all, for a device at `device`: without friction and shading, which act on either alike.
-    ///
-    /// Obstacles with a primitive are left out: they are far away.
     pub fn compare(&mut self, world: &World, god_object: &GodObject, device: &Pose) -> Difference {
         let settings = god_object.settings();
         let body = &world.body;
@@ -171,13 +169,10 @@ impl Oracle {
         self.contacts.clear();
         let placed = world.obstacles.iter().zip(god_object.obstacle_poses());
         for (index, (obstacle, pose)) in placed.enumerate() {
-            if obstacle.primitive.is_some() {
-                continue;
-            }
             let collected = collect_contacts(
-                &world.body.mesh,
+                &world.body,
                 god_object.pose(),
-                &obstacle.mesh,
+                obstacle,
                 pose,
                 index as u16,
                 reach,

@@ -68,7 +68,9 @@ impl VariantScene {
             mut obstacles,
         } = match variant.fit {
             Fit::PegInHole | Fit::ShaftInBore => Parts::of_shaft(variant, frame),
-            Fit::PlateInSlot | Fit::PlateOnTable => Parts::of_plate(variant, frame),
+            Fit::PlateInSlot | Fit::PlateOnTable | Fit::PlateOnHalfSpace => {
+                Parts::of_plate(variant, frame)
+            }
         };
         let surface = surface(variant.feel);
         obstacles
@@ -122,7 +124,9 @@ impl VariantScene {
     pub fn device(&self, time: f64) -> Pose {
         let (moved, turned) = match self.fit {
             Fit::PegInHole | Fit::ShaftInBore => in_hole(self.motion, time),
-            Fit::PlateInSlot | Fit::PlateOnTable => on_plate(self.motion, time),
+            Fit::PlateInSlot | Fit::PlateOnTable | Fit::PlateOnHalfSpace => {
+                on_plate(self.motion, time)
+            }
         };
         let start = self.frame.inverse() * self.start;
         let rotation = UnitQuaternion::from_scaled_axis(turned);
@@ -167,6 +171,12 @@ impl Parts {
         if variant.fit == Fit::PlateInSlot {
             let over = 2.0 * (PLATE[2] + play(variant));
             obstacles.push(obstacle("cover", noisy(variant, table, 2), at(over)));
+        }
+        if variant.fit == Fit::PlateOnHalfSpace {
+            obstacles[0].primitive = Some(Primitive::Plane {
+                normal: Vector3::z(),
+                point: Point3::new(0.0, 0.0, 20e-3),
+            });
         }
         let moved = plate(PLATE, variant.body, variant.crown);
         Self {

@@ -4,18 +4,20 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::collision::Collider;
 use crate::constraint::Contact;
 use crate::geometry::Mesh;
 use crate::quasi_statics::Metric;
 use crate::spatial::{Pose, Vector6, advance_pose};
 use crate::world::World;
 
-/// Where an obstacle is, and whether its rows are chosen: of exact primitives, which have few, every pair is a row, given from outside.
+/// Where an obstacle is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Place {
     /// World from obstacle.
     pub(crate) pose: Pose,
-    pub(crate) chosen: bool,
+    /// It and the body are meshes: the gaps of their pairs change to first order as the rows say, and continuous collision detection names triangles.
+    pub(crate) meshes: bool,
 }
 
 /// Where the rows are to hold.
@@ -47,6 +49,15 @@ impl At {
             reference,
             ..self.clone()
         }
+    }
+
+    /// What the body and an obstacle collide as, each with the world from it.
+    pub(crate) fn colliders(&self, index: usize) -> [(Collider<'_>, &Pose); 2] {
+        let obstacle = &self.world.obstacles[index];
+        [
+            ((&self.world.body).into(), &self.pose),
+            (obstacle.into(), &self.places[index].pose),
+        ]
     }
 
     /// An obstacle's mesh, and the world from it.

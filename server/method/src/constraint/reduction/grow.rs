@@ -97,19 +97,16 @@ impl RowReduction {
         }
     }
 
-    /// Makes the projector ready for the rows known, as the purpose sees them, and those given.
+    /// Makes the projector ready for the rows known, as the purpose sees them.
     fn prepare(&mut self, at: &At, purpose: Purpose) {
         let least_gap = purpose.least_gap(at);
         let known = self.known.iter().map(|row| {
             let (jacobian, nearer) = row.for_purpose(purpose);
             (jacobian, row.contact.gap, nearer)
         });
-        let given = self.given.iter();
-        let given = given.map(|(jacobian, gap)| (*jacobian, *gap, 0.0));
-        let all = known.chain(given);
         self.rows.clear();
         self.rows
-            .extend(all.map(|(jacobian, gap, nearer)| HalfSpace {
+            .extend(known.map(|(jacobian, gap, nearer)| HalfSpace {
                 jacobian,
                 bound: at.rest_distance - gap.max(least_gap) + nearer,
             }));
@@ -232,7 +229,8 @@ impl RowReduction {
         (index, (a, b)): (usize, (u32, u32)),
         work: &mut Work,
     ) {
-        if !at.places[index].chosen {
+        // What a primitive touches was collected.
+        if !at.places[index].meshes {
             return;
         }
         let (obstacle, pose) = at.obstacle(index);

@@ -61,7 +61,7 @@ fn block_on_block(higher: f64) -> At {
         world: Arc::new(world),
         places: Arc::new([Place {
             pose: Pose::from_parts(Vector3::zeros().into(), over),
-            chosen: true,
+            meshes: true,
         }]),
         pose,
         reference: pose,

@@ -48,7 +48,7 @@ fn balls(u: f64, [rings, sides]: [u32; 2]) -> At {
     At {
         places: Arc::new([Place {
             pose: world.obstacles[0].pose,
-            chosen: true,
+            meshes: true,
         }]),
         world: Arc::new(world),
         pose,

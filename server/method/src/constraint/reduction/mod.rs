@@ -45,7 +45,7 @@ use arrayvec::ArrayVec;
 pub(crate) use at::{At, Place, Purpose, Surfaces};
 pub(crate) use grow::Wished;
 
-use super::{Contact, FeaturePair, NonPenetrationConstraint, contact_jacobian};
+use super::{Contact, FeaturePair};
 use crate::collision::Work;
 use crate::quasi_statics::{HalfSpace, Projector, SolverKind};
 use crate::spatial::{Pose, Vector6};
@@ -83,8 +83,6 @@ pub(crate) struct RowReduction {
     room: usize,
     /// Counts projections and rows added.
     now: u64,
-    /// Rows of the pairs that are not chosen from: Jacobian and gap, m.
-    given: Vec<(Vector6, f64)>,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
     /// Largest violation that a motion asked for was left with, m.
@@ -106,6 +104,7 @@ impl RowReduction {
     /// A reduction of this world, for at most so many rows that trees find at a time. Allocates everything that it will ever need.
     pub(crate) fn with_capacity(candidates: usize, world: &World) -> Self {
         let most = MAX_ROWS + candidates;
+        let mut obstacles = world.obstacles.iter();
         Self {
             projector: Projector::new(SolverKind::ActiveSet, most),
             candidates: Candidates::with_capacity(candidates + SEARCHED),
@@ -114,14 +113,14 @@ impl RowReduction {
             known: Vec::with_capacity(MAX_ROWS),
             room: MAX_ROWS.min(candidates),
             now: 0,
-            given: Vec::with_capacity(candidates),
             rows: Vec::with_capacity(most),
             warm_start: Vec::with_capacity(6),
             error: 0.0,
             truncated: false,
             asked: 0.0,
             given_up_at: vec![None; world.obstacles.len()],
-            outdated: false,
+            // What primitives touch is collected, and never searched for.
+            outdated: world.body.primitive.is_some() || obstacles.any(|o| o.primitive.is_some()),
             gone: vec![0.0; world.obstacles.len()],
             served: 0.0,
         }
@@ -176,9 +175,19 @@ impl RowReduction {
         }
         self.forget_corners();
         self.candidates.move_to(&at.reference);
+        self.outdated |= self.bends(at);
         if let Some(witness) = witness {
             self.take_witness((at, surfaces), witness, work);
         }
+    }
+
+    /// Whether the body has moved beside a primitive: round surfaces bend from one sub-step to the next.
+    fn bends(&self, at: &At) -> bool {
+        let all_meshes = at.places.iter().all(|place| place.meshes);
+        let rows = self.known.iter().map(|row| &row.contact);
+        let mut all = rows.chain(&self.candidates.contacts);
+        let is_round = |c: &Contact| !at.places[usize::from(c.features.obstacle)].meshes;
+        !all_meshes && self.candidates.moved != Vector6::zeros() && all.any(is_round)
     }
 
     /// The body has made a motion together with the obstacles that the candidates are of.
@@ -215,23 +224,6 @@ impl RowReduction {
     /// Whether the set has room for as many rows as are ever known: otherwise rows of what may be would take the place of rows of what is.
     pub(crate) fn has_whole_room(&self) -> bool {
         self.room == MAX_ROWS
-    }
-
-    /// Rows of the present pose that hold beside those that are chosen, in a set of at most `capacity` rows.
-    pub(crate) fn give(&mut self, at: &At, rows: &[NonPenetrationConstraint], capacity: usize) {
-        self.room = MAX_ROWS.min(capacity.saturating_sub(rows.len()));
-        while self.known.len() > self.room
-            && let Some(place) = self.least_recently_used()
-        {
-            let dropped = self.known.swap_remove(place);
-            self.note_dropped(&dropped);
-        }
-        let center = at.center();
-        self.given.clear();
-        self.given.extend(rows.iter().map(|row| {
-            let jacobian = contact_jacobian(&row.normal, &row.point, &center);
-            (jacobian, row.gap)
-        }));
     }
 
     /// Adds the candidate that an answer which was found elsewhere violates most, if by more than the tolerance; whether there is one.

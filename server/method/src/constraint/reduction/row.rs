@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use super::at::{At, Purpose, Surfaces};
 use crate::collision::{Placement, Work};
 use crate::constraint::collect::in_world;
-use crate::constraint::facing::{Facing, Reach};
+use crate::constraint::facing::{Reach, contact_of};
 use crate::constraint::{Contact, FeaturePair, contact_jacobian};
 use crate::spatial::Vector6;
 
@@ -35,17 +35,14 @@ pub(super) fn face(
     past_reentrant_edges: bool,
     work: &mut Work,
 ) -> Option<Contact> {
-    let (mesh, pose) = at.obstacle(usize::from(features.obstacle));
-    let placement = Placement::of(&at.pose, pose);
+    let [(body, body_pose), (obstacle, pose)] = at.colliders(usize::from(features.obstacle));
+    let placement = Placement::of(body_pose, pose);
     let reach = Reach {
         past_reentrant_edges,
         ..Reach::new(f64::INFINITY)
     };
-    let (body, index) = (&at.world.body.mesh, features.obstacle);
-    let facing = Facing::new(body, mesh, &placement, index, reach);
     work.feature_pairs += 1;
-    facing
-        .features(features)
+    contact_of(features, (&body, &obstacle), &placement, &reach)
         .map(|contact| in_world(&contact, pose))
 }
 
