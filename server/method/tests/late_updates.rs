@@ -1,4 +1,4 @@
-//! What a set looks ahead costs no more than the settings allow, where every pair becomes a row.
+//! What a set looks ahead costs no more than the settings allow, beside a primitive, whose pairs are collected without a bound.
 
 use std::sync::Arc;
 

@@ -1,5 +1,4 @@
-//! The constraint set of the present pose: rows that are chosen ([`generation`](super::generation)), or every pair of features that face each other
-//! within a distance.
+//! The constraint set of the present pose: rows that are chosen ([`generation`](super::generation)), or the paper's cone of every touching contact.
 
 use std::sync::Arc;
 
@@ -15,50 +14,6 @@ use crate::spatial::{Pose, pose_difference};
 use crate::surface::ShadingNormals;
 use crate::world::World;
 
-/// Every row, as many as there is room for: the nearest, whichever obstacle they are of.
-#[derive(Debug)]
-pub(super) struct GivenRows {
-    rows: Vec<NonPenetrationConstraint>,
-    pub(super) gap_min: f64,
-    pub(super) truncated: bool,
-    pub(super) complete_within: f64,
-}
-
-impl GivenRows {
-    /// What is held while obstacles are gone through: the nearest of those before, and all of one more.
-    pub(super) fn room(capacity: usize) -> usize {
-        2 * capacity
-    }
-
-    pub(super) fn with_capacity(capacity: usize) -> Self {
-        Self {
-            rows: Vec::with_capacity(Self::room(capacity)),
-            gap_min: f64::INFINITY,
-            truncated: false,
-            complete_within: f64::INFINITY,
-        }
-    }
-
-    fn clear(&mut self, within: f64) {
-        self.rows.clear();
-        self.gap_min = f64::INFINITY;
-        self.truncated = false;
-        self.complete_within = within;
-    }
-
-    /// Leaves the nearest `room` rows.
-    fn keep_nearest(&mut self, room: usize) {
-        if self.rows.len() > room {
-            self.rows.select_nth_unstable_by(room, |a, b| {
-                a.gap.total_cmp(&b.gap).then(a.features.cmp(&b.features))
-            });
-            self.complete_within = self.complete_within.min(self.rows[room].gap);
-            self.rows.truncate(room);
-            self.truncated = true;
-        }
-    }
-}
-
 impl GodObject {
     /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m, or those of them that are chosen.
     pub(super) fn collect(&mut self, distance: f64, work: &mut Work) {
@@ -66,8 +21,7 @@ impl GodObject {
         self.searched.clear();
         self.note_places();
         if !self.refresh(distance, work) {
-            self.collect_given(distance, work);
-            self.write_given();
+            self.collect_cone(distance, work);
         }
     }
 
@@ -112,9 +66,12 @@ impl GodObject {
         }
     }
 
-    /// Every pair within `distance`, m.
-    fn collect_given(&mut self, distance: f64, work: &mut Work) {
-        self.given.clear(distance);
+    /// The paper's cone: every pair within `distance` (m) is a row, the nearest where there is no room for all, whichever obstacle they are of.
+    fn collect_cone(&mut self, distance: f64, work: &mut Work) {
+        self.begin_set();
+        self.set.gap_min = f64::INFINITY;
+        self.set.truncated = false;
+        self.set.complete_within = distance;
         for index in 0..self.obstacles.len() {
             self.contacts.clear();
             let collected = collect_contacts(
@@ -128,16 +85,47 @@ impl GodObject {
                 &mut self.contacts,
                 work,
             );
-            let given = &mut self.given;
-            given.gap_min = given.gap_min.min(collected.gap_min);
-            given.truncated |= collected.truncated;
-            given.complete_within = given.complete_within.min(collected.complete_within);
+            let set = &mut self.set;
+            set.gap_min = set.gap_min.min(collected.gap_min);
+            set.truncated |= collected.truncated;
+            set.complete_within = set.complete_within.min(collected.complete_within);
             for k in 0..self.contacts.len() {
                 let row = self.row_of(index, &self.contacts[k]);
-                self.given.rows.push(row);
+                self.set.constraints.push(row);
             }
-            self.given.keep_nearest(self.settings.max_constraints);
+            self.keep_nearest();
         }
+        self.end_set();
+    }
+
+    /// Leaves as many rows as the set is to hold at most.
+    fn keep_nearest(&mut self) {
+        let (set, most) = (&mut self.set, self.settings.max_constraints);
+        if set.constraints.len() > most {
+            set.constraints.select_nth_unstable_by(most, |a, b| {
+                a.gap.total_cmp(&b.gap).then(a.features.cmp(&b.features))
+            });
+            set.complete_within = set.complete_within.min(set.constraints[most].gap);
+            set.constraints.truncate(most);
+            set.truncated = true;
+        }
+    }
+
+    /// Empties the set for rows of the present pose.
+    pub(super) fn begin_set(&mut self) {
+        self.set.sequence += 1;
+        self.set.published = None;
+        self.set.god_object_pose = self.pose;
+        self.set.constraints.clear();
+    }
+
+    /// The set has its rows.
+    pub(super) fn end_set(&mut self) {
+        // Ascending features: the coupling finds known rows by bisection, and the order says nothing of the traversal.
+        self.set
+            .constraints
+            .sort_unstable_by_key(|row| row.features);
+        self.warm_start.clear();
     }
 
     /// What the scene adds to contacts, while obstacles are to be where they are, or `ahead` of that.
@@ -160,22 +148,6 @@ impl GodObject {
             obstacle_displacement: placed.displacement_at(&contact.point_on_obstacle),
             shading_normal: self.surfaces(None).shading_normal(contact),
         }
-    }
-
-    /// The rows given are all that there are.
-    fn write_given(&mut self) {
-        self.set.sequence += 1;
-        self.set.published = None;
-        self.set.god_object_pose = self.pose;
-        self.set.gap_min = self.given.gap_min;
-        self.set.truncated = self.given.truncated;
-        self.set.complete_within = self.given.complete_within;
-        std::mem::swap(&mut self.set.constraints, &mut self.given.rows);
-        // Ascending features: the coupling finds known rows by bisection, and the order says nothing of the traversal.
-        self.set
-            .constraints
-            .sort_unstable_by_key(|row| row.features);
-        self.warm_start.clear();
     }
 }
 

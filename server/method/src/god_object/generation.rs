@@ -282,25 +282,19 @@ impl GodObject {
 
     /// The rows known become the constraint set.
     fn write_set(&mut self) {
-        let Some(reduction) = &self.reduction else {
+        let Some(reduction) = self.reduction.take() else {
             return;
         };
-        self.set.sequence += 1;
-        self.set.published = None;
-        self.set.god_object_pose = self.pose;
+        self.begin_set();
         self.set.truncated = reduction.truncated();
         self.set.reduction_error = reduction.error();
         self.set.complete_within = reduction.known_within(self.radius);
-        self.set.constraints.clear();
         for contact in reduction.contacts() {
             let index = usize::from(contact.features.obstacle);
             let row = self.row_of(index, contact);
             self.set.constraints.push(row);
         }
-        // Ascending features: the coupling finds known rows by bisection, and the order says nothing of the traversal.
-        self.set
-            .constraints
-            .sort_unstable_by_key(|row| row.features);
-        self.warm_start.clear();
+        self.end_set();
+        self.reduction = Some(reduction);
     }
 }

@@ -57,7 +57,7 @@ impl GodObject {
         }
     }
 
-    /// Takes note of what a collection within `distance` (m) of every row cost, in pairs of triangles and of features. Where rows are chosen, a collection
+    /// Takes note of what a collection within `distance` (m) beside primitives cost, in pairs of triangles and of features. Between meshes a collection
     /// has its own bound: it reaches as far as the work allows and no less.
     pub(super) fn afford_look_ahead(&mut self, distance: f64, pairs: u64) {
         if pairs > self.settings.look_ahead_pairs {

@@ -6,7 +6,6 @@ use arrayvec::ArrayVec;
 use nalgebra::Vector3;
 
 use super::carry::Carry;
-use super::collection::GivenRows;
 use super::generation::LEADING_MOTIONS;
 use super::placed_obstacle::PlacedObstacle;
 use super::substep::{StepMemory, Update};
@@ -73,9 +72,9 @@ pub struct GodObject {
     pub(super) impact_pairs: u64,
     /// Distance within which the present set has every row, m.
     pub(super) collected_within: f64,
-    /// Longest look-ahead that the last collections' cost allows, where rows are not chosen, m.
+    /// Longest look-ahead that the last collections beside primitives allow by their cost, m.
     pub(super) affordable: f64,
-    /// Finds rows as they are needed; `None` where every pair is collected.
+    /// Finds rows as they are needed; `None` for the paper's cone.
     pub(super) reduction: Option<Box<RowReduction>>,
     /// Where each obstacle is.
     pub(super) places: Arc<[Place]>,
@@ -83,8 +82,6 @@ pub struct GodObject {
     pub(super) looked_at: Vec<u64>,
     /// The obstacles, those first whose last collection looked at the fewest pairs.
     pub(super) order: Vec<usize>,
-    /// Every row, where none are chosen.
-    pub(super) given: GivenRows,
 }
 
 impl GodObject {
@@ -114,11 +111,11 @@ impl GodObject {
                 .collect(),
             looked_at: vec![0; obstacles],
             order: (0..obstacles).collect(),
-            given: GivenRows::with_capacity(capacity),
             world,
             settings,
             pose: start,
-            set: ConstraintSet::with_capacity(GivenRows::room(capacity)),
+            // The nearest rows of some obstacles, and all of one more.
+            set: ConstraintSet::with_capacity(2 * capacity),
             projector: Projector::new(settings.solver, capacity).with_reference_fallback(true),
             collision: CollisionWorkspace::for_obstacles(obstacles),
             contacts: Vec::with_capacity(capacity),
