@@ -33,10 +33,10 @@ impl GodObject {
             left = left.saturating_sub(collected.looked_at.min(pairs));
             self.looked_at[index] = collected.looked_at;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
-            reduction.offer(at, index, &self.contacts, &collected);
+            let first = reduction.offer(at, index, &self.contacts, &collected);
             if !at.places[index].meshes {
                 of_primitives += collected.looked_at;
-                reduction.take_nearest((at, &self.surfaces(None)), index);
+                reduction.take_nearest((at, &self.surfaces(None)), first);
             }
         }
         self.afford_look_ahead(distance, of_primitives);

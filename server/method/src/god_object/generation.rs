@@ -107,16 +107,20 @@ impl GodObject {
         let all = self.with_reduction(|this, reduction, at| {
             let surfaces = this.surfaces(None);
             reduction.set_surfaces(at, &surfaces);
-            reduction.take_all((at, &surfaces)) && !reduction.was_given_up()
+            let all = reduction.take_all((at, &surfaces)) && !reduction.was_given_up();
+            (all, reduction.has_meshes(at))
         });
         let probes = self.probes(difference, reach);
-        // Where every pair is a row, those remain that they turn into.
-        let asked = if all == Some(true) {
-            LEADING_MOTIONS
-        } else {
-            MAX_MOTIONS
+        let asked = match all {
+            // Every pair is a row.
+            Some((true, false)) => 0,
+            // Those remain that they turn into.
+            Some((true, true)) => LEADING_MOTIONS,
+            _ => MAX_MOTIONS,
         };
-        self.complete_for_force(&probes[..asked], work);
+        if asked > 0 {
+            self.complete_for_force(&probes[..asked], work);
+        }
         self.with_reduction(|this, reduction, at| {
             let continued = |way: &Vector6| this.continued(way, reach);
             let of = (at, &this.surfaces(None) as &dyn Surfaces);

@@ -29,15 +29,14 @@ impl RowReduction {
         true
     }
 
-    /// Makes the nearest candidates of an obstacle rows while rows are few. At the pose where they were collected.
-    pub(crate) fn take_nearest(&mut self, (at, surfaces): (&At, &dyn Surfaces), obstacle: usize) {
-        for k in 0..self.candidates.contacts.len() {
+    /// Makes candidates from this place on rows while rows are few. At the pose where they were collected.
+    pub(crate) fn take_nearest(&mut self, (at, surfaces): (&At, &dyn Surfaces), first: usize) {
+        for k in first..self.candidates.contacts.len() {
             let contact = self.candidates.contacts[k];
             if self.known.len() >= FEW.min(self.room) {
                 return;
             }
-            if usize::from(contact.features.obstacle) == obstacle && !self.knows(&contact.features)
-            {
+            if !self.knows(&contact.features) {
                 self.add(Known::of(&contact, surfaces, &at.center()));
             }
         }

@@ -268,6 +268,12 @@ impl RowReduction {
         least
     }
 
+    /// Whether some row is of two meshes, whose pairs turn into others.
+    pub(crate) fn has_meshes(&self, at: &At) -> bool {
+        let mut rows = self.known.iter().map(|row| row.contact.features.obstacle);
+        rows.any(|obstacle| at.places[usize::from(obstacle)].meshes)
+    }
+
     fn known_mut(&mut self, features: &FeaturePair) -> Option<&mut Known> {
         let mut rows = self.known.iter_mut();
         rows.find(|row| row.contact.features == *features)
