@@ -34,7 +34,7 @@ impl GodObject {
     }
 
     /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
-    /// collected last do not reach as far. False where every pair becomes a row.
+    /// collected last do not reach as far. False for the paper's cone.
     pub(super) fn refresh(&mut self, distance: f64, work: &mut Work) -> bool {
         self.with_reduction(|this, reduction, at| {
             let stopped = this.stopped.take();
