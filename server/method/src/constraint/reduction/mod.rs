@@ -175,19 +175,9 @@ impl RowReduction {
         }
         self.forget_corners();
         self.candidates.move_to(&at.reference);
-        self.outdated |= self.bends(at);
         if let Some(witness) = witness {
             self.take_witness((at, surfaces), witness, work);
         }
-    }
-
-    /// Whether the body has moved beside a primitive: round surfaces bend from one sub-step to the next.
-    fn bends(&self, at: &At) -> bool {
-        let all_meshes = at.places.iter().all(|place| place.meshes);
-        let rows = self.known.iter().map(|row| &row.contact);
-        let mut all = rows.chain(&self.candidates.contacts);
-        let is_round = |c: &Contact| !at.places[usize::from(c.features.obstacle)].meshes;
-        !all_meshes && self.candidates.moved != Vector6::zeros() && all.any(is_round)
     }
 
     /// The body has made a motion together with the obstacles that the candidates are of.
