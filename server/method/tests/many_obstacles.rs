@@ -81,10 +81,11 @@ impl Course {
         course
     }
 
-    /// The largest difference of wrenches, N and N m.
-    fn off(&self, other: &Self) -> f64 {
+    /// The largest difference of wrenches, N and N m: after the first update, and after all others.
+    fn off(&self, other: &Self) -> [f64; 2] {
         let both = self.wrenches.iter().zip(&other.wrenches);
-        both.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+        let mut off = both.map(|(a, b)| (a - b).norm());
+        [off.next().unwrap_or(0.0), off.fold(0.0, f64::max)]
     }
 
     /// Pairs of triangles and of features, and steps with them: what two surfaces cost that are near each other.
@@ -122,8 +123,10 @@ fn forces_and_work_do_not_depend_on_the_order_of_the_obstacles() {
                 other.reverse();
             }
             let other = Course::among(other, far);
-            // A row that an answer violates by less than the tolerance of rows may be known or not.
-            assert!(course.off(&other) < 1e-4, "{:e} N", course.off(&other));
+            // A row that an answer violates by less than the tolerance of rows may be known or not. The first update jumps by millimetres: where the
+            // body grazes it stops within the gap tolerance, at one place or another.
+            let [first, others] = course.off(&other);
+            assert!(first < 1e-3 && others < 2e-5, "{first:e} {others:e} N");
             assert_eq!(course.substeps, other.substeps);
             let (work, others) = (course.near_work(), other.near_work());
             for (a, b) in work.into_iter().zip(others) {
@@ -147,7 +150,7 @@ fn obstacles_far_away_change_no_force_and_cost_nothing() {
             [near.clone(), far.clone()].concat()
         };
         let other = Course::among(more, 0.02);
-        assert_eq!(course.off(&other), 0.0);
+        assert_eq!(course.off(&other), [0.0; 2]);
         assert_eq!(course.work, other.work);
     }
 }

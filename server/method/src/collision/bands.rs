@@ -14,11 +14,11 @@ use pulp::{Simd, WithSimd};
 use super::beyond::Beyond;
 use super::buckets::Buckets;
 use super::descent::{AT_ONCE, AtRest, Opened, open};
-use super::facing_volumes::FacingVolumes;
+use super::still_pair::StillPair;
 use super::turned::TurnedNodes;
 use super::work::Work;
 use crate::geometry::lanes::LANES;
-use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
+use crate::geometry::wide_tree::{Below, Child, ROOT};
 
 /// Number of bands, K. The first is a two-thousandth of the margin wide. More of them would leave the trees' nodes in an order that the cache
 /// does not like.
@@ -53,24 +53,22 @@ pub(super) fn band_of(share: f32) -> u32 {
     band.min(LAST)
 }
 
-/// Calls `visit` for the pairs of triangles, (body, obstacle), whose volumes may come within `margin` and face each other all the way down,
+/// Calls `visit` for the pairs of triangles, (body, obstacle), whose volumes may come within the margin and face each other all the way down,
 /// nearest first to a band; stops when it returns false. Pairs of volumes that own features `wanted` refuses are not opened.
 ///
-/// `volumes` are at rest and have the same margin. Returns the distance, m, within which every such pair was visited: `margin` unless stopped.
+/// Returns the distance, m, within which every such pair was visited: the margin unless stopped.
 pub(crate) fn for_nearest_triangle_pairs(
-    trees: (&WideTree, &WideTree),
-    (volumes, margin): (&FacingVolumes, f64),
+    still: &StillPair<'_>,
     (bands, turned): (&mut Bands, &mut TurnedNodes),
     work: &mut Work,
     wanted: impl Fn(u8, u8) -> bool,
     visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) -> f64 {
     let order = Nearest {
-        scale: (1.0 / margin) as f32,
+        scale: (1.0 / still.margin) as f32,
     };
-    let stopped_in = volumes.processor.dispatch(ByBand {
-        trees,
-        volumes,
+    let stopped_in = still.volumes.processor.dispatch(ByBand {
+        still,
         bands,
         turned,
         work,
@@ -78,19 +76,21 @@ pub(crate) fn for_nearest_triangle_pairs(
         order,
         visit,
     });
-    stopped_in.map_or(margin, |band| edge(band, margin))
+    stopped_in.map_or(still.margin, |band| edge(band, still.margin))
 }
 
 /// In which band each pair of volumes is that was opened; [`OUT_OF_QUESTION`] leaves a pair out. No closure: it is to be compiled with the vectors of the
 /// search that it is part of.
 pub(super) trait Order {
     fn bands(&mut self, opened: &Opened<Beyond>) -> [u32; LANES];
+
+    /// In which band one pair is that is apart by so much more than the margin, m, which says more than the volumes do.
+    fn band(&mut self, pair: (Child, Child), by: f32) -> u32;
 }
 
 /// A search that visits pairs of triangles in the order of their bands. The answer is the band in which it ended because `visit` returned false or there was no room.
 pub(super) struct ByBand<'a, W, O, V> {
-    pub(super) trees: (&'a WideTree, &'a WideTree),
-    pub(super) volumes: &'a FacingVolumes,
+    pub(super) still: &'a StillPair<'a>,
     pub(super) bands: &'a mut Bands,
     pub(super) turned: &'a mut TurnedNodes,
     pub(super) work: &'a mut Work,
@@ -111,8 +111,7 @@ where
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Option<usize> {
         let Self {
-            trees,
-            volumes,
+            still,
             bands,
             turned,
             work,
@@ -120,6 +119,7 @@ where
             mut order,
             mut visit,
         } = self;
+        let (trees, volumes) = (still.trees, &still.volumes);
         let (body, obstacle) = trees;
         bands.clear();
         let mut room = bands.push(0, (ROOT, ROOT));
@@ -134,6 +134,14 @@ where
                 // Not before its turn: most that wait never have one.
                 if !wanted(body.owned(a), obstacle.owned(b)) {
                     continue;
+                }
+                if let Some(by) = still.beyond_primitive((a, b)) {
+                    let own = order.band((a, b), by as f32) as usize;
+                    if own > band {
+                        // Out of the question, or later.
+                        room &= own >= SIGNED_BANDS || bands.push(own, (a, b));
+                        continue;
+                    }
                 }
                 if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b))
                 {
@@ -176,6 +184,15 @@ struct Nearest {
 }
 
 impl Order for Nearest {
+    #[inline(always)]
+    fn band(&mut self, _: (Child, Child), by: f32) -> u32 {
+        if by > 0.0 {
+            OUT_OF_QUESTION
+        } else {
+            band_of(1.0 + by * self.scale) // near for NaN
+        }
+    }
+
     #[inline(always)]
     fn bands(&mut self, opened: &Opened<Beyond>) -> [u32; LANES] {
         let mut bands = [0; LANES];

@@ -162,11 +162,13 @@ impl Collider<'_> {
         }
     }
 
-    /// Its tree: a mesh's own, or `leaf`, which becomes that of a primitive. A half-space is made to reach `size` (m) about `center`, its frame.
+    /// Its tree: a mesh's own, or `leaf`, which becomes that of a primitive. A half-space is made to reach `size` (m) about `center`, its frame, and has
+    /// its one normal where what `faces` it is asked for; other primitives, and all where it is what crosses them, have normals all ways.
     pub(super) fn tree<'t>(
         &'t self,
         leaf: &'t mut WideTree,
         (center, size): (&Point3<f64>, f64),
+        faces: bool,
     ) -> &'t WideTree {
         let primitive = match self {
             Self::Mesh(mesh) => return mesh.wide_tree(),
@@ -203,6 +205,11 @@ impl Collider<'_> {
         if self.is_half_space() {
             // No larger than any body, for the lengths that intervals are measured by.
             volume.radius = 0.0;
+            // It is a face: corners meet it.
+            volume.owned = 0;
+            if faces {
+                (volume.cosine, volume.sine) = (1.0, 0.0);
+            }
         }
         leaf.hold(middle, radius, &volume);
         leaf
@@ -227,7 +234,7 @@ impl Collider<'_> {
         }
     }
 
-    fn is_half_space(&self) -> bool {
+    pub(super) fn is_half_space(&self) -> bool {
         matches!(self, Self::Primitive(Primitive::Plane { .. }))
     }
 }

@@ -4,8 +4,9 @@ use super::bands::{BANDS, Bands, ByBand, OUT_OF_QUESTION, Order, band_of};
 use super::beyond::Beyond;
 use super::descent::Opened;
 use super::displacements::Motions;
-use super::facing_volumes::{FacingVolumes, Side};
+use super::facing_volumes::Side;
 use super::single::larger;
+use super::still_pair::StillPair;
 use super::turned::TurnedNodes;
 use super::work::Work;
 use crate::geometry::lanes::{LANES, Lanes};
@@ -30,13 +31,12 @@ fn signed_band_of(share: f32) -> u32 {
     }
 }
 
-/// Calls `visit` for the pairs of triangles, (body, obstacle), within `margin`, m, that some of the motions may bring below `target`, m: those first that
+/// Calls `visit` for the pairs of triangles, (body, obstacle), within the margin that some of the motions may bring below `target`, m: those first that
 /// end up deepest, to a band. Pairs nearer than `known_within` (m) are known: only what may bring one below the target that is as far apart is looked
 /// at. The motions are given as the body and as the obstacle sees them. Stops when `visit` returns false, and where there is no room for pairs of
 /// volumes that wait.
 pub(crate) fn for_deepest_triangle_pairs(
-    trees: (&WideTree, &WideTree),
-    (volumes, margin): (&FacingVolumes, f64),
+    still: &StillPair<'_>,
     (motions, known_within, target): ([&Motions; 2], f32, f32),
     (bands, turned): (&mut Bands, &mut TurnedNodes),
     work: &mut Work,
@@ -44,15 +44,14 @@ pub(crate) fn for_deepest_triangle_pairs(
     visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) {
     let order = Deepest {
-        body: Along::of(motions[0], trees.0),
-        obstacle: Along::of(motions[1], trees.1),
-        margin: margin as f32,
+        body: Along::of(motions[0], still.trees.0, still.endless[0]),
+        obstacle: Along::of(motions[1], still.trees.1, still.endless[1]),
+        margin: still.margin as f32,
         known_within: known_within * (1.0 - KNOWN_ROUNDING),
         target,
     };
-    volumes.processor.dispatch(ByBand {
-        trees,
-        volumes,
+    still.volumes.processor.dispatch(ByBand {
+        still,
         bands,
         turned,
         work,
@@ -76,15 +75,18 @@ struct Deepest<'a> {
 struct Along<'a> {
     motions: &'a Motions,
     tree: &'a WideTree,
+    /// No ball holds what the tree's volume holds.
+    endless: bool,
     nodes: [u32; KEPT],
     least: [Lanes; KEPT],
 }
 
 impl<'a> Along<'a> {
-    fn of(motions: &'a Motions, tree: &'a WideTree) -> Self {
+    fn of(motions: &'a Motions, tree: &'a WideTree, endless: bool) -> Self {
         Self {
             motions,
             tree,
+            endless,
             nodes: [NO_NODE; KEPT],
             least: [Lanes::splat(0.0); KEPT],
         }
@@ -97,33 +99,49 @@ impl<'a> Along<'a> {
         let place = node as usize % KEPT;
         if self.nodes[place] != node {
             self.nodes[place] = node;
-            self.least[place] = self.motions.least_along(self.tree.node(node));
+            self.least[place] = if self.endless {
+                Lanes::splat(f32::NEG_INFINITY)
+            } else {
+                self.motions.least_along(self.tree.node(node))
+            };
         }
         &self.least[place]
     }
 }
 
+impl Deepest<'_> {
+    /// The band of a pair that is apart by so much more than the margin, where the motions carry either's volume by these along its normals at least, m.
+    #[inline(always)]
+    fn band_of(&self, by: f32, [of_one, of_other]: [f32; 2]) -> u32 {
+        let gap = larger(self.margin + by, self.known_within);
+        let short = gap + larger(of_one, of_other) - self.target;
+        let signed = signed_band_of(short * (1.0 / self.margin));
+        if short > 0.0 { OUT_OF_QUESTION } else { signed } // in question for NaN
+    }
+}
+
 impl Order for Deepest<'_> {
+    #[inline(always)]
+    fn band(&mut self, (a, b): (Child, Child), by: f32) -> u32 {
+        if by > 0.0 {
+            return OUT_OF_QUESTION;
+        }
+        let of_body = self.body.least(a).0[a as usize % LANES];
+        let of_obstacle = self.obstacle.least(b).0[b as usize % LANES];
+        self.band_of(by, [of_body, of_obstacle])
+    }
+
     #[inline(always)]
     fn bands(&mut self, opened: &Opened<Beyond>) -> [u32; LANES] {
         let (eight, one) = match opened.side {
             Side::Body => (&mut self.body, &mut self.obstacle),
             Side::Obstacle => (&mut self.obstacle, &mut self.body),
         };
-        let of_eight = eight.least(opened.first);
+        let of_eight = *eight.least(opened.first);
         let of_one = one.least(opened.other).0[opened.other as usize % LANES];
-        let (margin, known_within, scale) = (self.margin, self.known_within, 1.0 / self.margin);
         let mut bands = [0; LANES];
         for (k, band) in bands.iter_mut().enumerate() {
-            let gap = larger(margin + opened.found.by.0[k], known_within);
-            let short = gap + larger(of_one, of_eight.0[k]) - self.target;
-            let signed = signed_band_of(short * scale);
-            let out_of_question = short > 0.0; // false for NaN
-            *band = if out_of_question {
-                OUT_OF_QUESTION
-            } else {
-                signed
-            };
+            *band = self.band_of(opened.found.by.0[k], [of_one, of_eight.0[k]]);
         }
         bands
     }

@@ -5,6 +5,7 @@ use pulp::{Simd, WithSimd};
 use super::beyond::{Beyond, beyond};
 use super::facing_volumes::{FacingVolumes, Side};
 use super::one_to_eight::OneToEight;
+use super::still_pair::StillPair;
 use super::turned::TurnedNodes;
 use super::windows::{Window, Windows, windows};
 use super::work::Work;
@@ -28,16 +29,14 @@ pub(super) fn at_once(waiting: usize) -> usize {
 /// Calls `visit` for every pair of triangles, (body, obstacle), whose volumes may come near and face each other all the way
 /// down; stops when it returns false. Pairs of volumes that own features `wanted` refuses, (body, obstacle), are not opened.
 pub(crate) fn for_facing_triangle_pairs(
-    trees: (&WideTree, &WideTree),
-    volumes: &FacingVolumes,
+    still: &StillPair<'_>,
     (stack, turned): (&mut Vec<(Child, Child)>, &mut TurnedNodes),
     work: &mut Work,
     wanted: impl Fn(u8, u8) -> bool,
     visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) {
-    volumes.processor.dispatch(DepthFirst {
-        trees,
-        volumes,
+    still.volumes.processor.dispatch(DepthFirst {
+        still,
         stack,
         turned,
         work,
@@ -48,8 +47,7 @@ pub(crate) fn for_facing_triangle_pairs(
 
 /// That search, with the vectors that the processor has.
 struct DepthFirst<'a, W, V> {
-    trees: (&'a WideTree, &'a WideTree),
-    volumes: &'a FacingVolumes,
+    still: &'a StillPair<'a>,
     stack: &'a mut Vec<(Child, Child)>,
     turned: &'a mut TurnedNodes,
     work: &'a mut Work,
@@ -67,14 +65,14 @@ where
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let Self {
-            trees,
-            volumes,
+            still,
             stack,
             turned,
             work,
             wanted,
             mut visit,
         } = self;
+        let (trees, volumes) = (still.trees, &still.volumes);
         let (body, obstacle) = trees;
         stack.clear();
         stack.push((ROOT, ROOT));
@@ -84,6 +82,9 @@ where
             while count < most
                 && let Some((a, b)) = stack.pop()
             {
+                if still.beyond_primitive((a, b)).is_some_and(|by| by > 0.0) {
+                    continue;
+                }
                 if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b))
                 {
                     work.triangle_pairs += 1;

@@ -8,7 +8,7 @@ use super::descent::{AT_ONCE, InMotion, Opened, at_once, open};
 use super::facing_volumes::Side;
 use super::impact::First;
 use super::intervals::{Interval, Intervals, WHOLE, halvings};
-use super::problem::{Problem, stays_beyond};
+use super::problem::{Problem, beyond_primitive, primitive_of};
 use super::turned::TurnedNodes;
 use super::windows::{Window, Windows};
 use super::work::Work;
@@ -188,7 +188,7 @@ impl Run<'_, '_> {
             return None;
         }
         let volumes = &interval.volumes;
-        let beyond = |primitive| stays_beyond(primitive, volumes, trees, next.pair);
+        let beyond = |primitive| beyond_primitive(primitive, volumes, trees, next.pair) > 0.0;
         if self.primitive.is_some_and(beyond) {
             return None;
         }
@@ -268,7 +268,7 @@ impl WithSimd for DescentInMotion<'_, '_> {
                 last: Part::of(1.0),
             },
             turned: &mut workspace.turned,
-            primitive: problem.primitive(),
+            primitive: primitive_of(&problem.body, &problem.obstacle),
             end: self.first.time,
             first: self.first,
             work: self.work,

@@ -43,6 +43,8 @@ struct Small {
 #[derive(Clone, Debug)]
 pub(crate) struct Motions {
     all: ArrayVec<Small, MAX_MOTIONS>,
+    /// The one normal that contacts have, out of the tree's side: opposite is a half-space.
+    only_normal: Option<[f32; 3]>,
     /// Cosine and sine of what cones are widened by.
     turn: [f32; 2],
 }
@@ -75,7 +77,16 @@ impl Motions {
         };
         Self {
             all: motions.iter().take(MAX_MOTIONS).map(small).collect(),
+            only_normal: None,
             turn: [tilt.cos() as f32, tilt.sin() as f32],
+        }
+    }
+
+    /// The same where contacts have one normal alone, out of that side, in its tree's axes.
+    pub(crate) fn along(self, normal: &Vector3<f64>) -> Self {
+        Self {
+            only_normal: Some(normal.map(|x| x as f32).into()),
+            ..self
         }
     }
 
@@ -84,6 +95,9 @@ impl Motions {
     /// One loop over the lanes, without branches: the compiler makes vectors of it, of those that its caller was compiled for.
     #[inline(always)]
     pub(super) fn least_along(&self, node: &WideNode) -> Lanes {
+        if let Some(normal) = &self.only_normal {
+            return self.least_along_normal(node, normal);
+        }
         let [cos, sin] = self.turn;
         let mut least = Lanes::splat(f32::INFINITY);
         for motion in &self.all {
@@ -106,6 +120,22 @@ impl Motions {
                 };
                 let turning = motion.angle * node.radius.0[k];
                 least.0[k] = smaller(in_cone - turning - motion.rounding, least.0[k]);
+            }
+        }
+        least
+    }
+
+    /// The same along one normal.
+    #[inline(always)]
+    fn least_along_normal(&self, node: &WideNode, normal: &[f32; 3]) -> Lanes {
+        let mut least = Lanes::splat(f32::INFINITY);
+        for motion in &self.all {
+            let middle = sum(&motion.at_origin, &product(&motion.spin, &node.origin));
+            for k in 0..LANES {
+                let center = [0, 1, 2].map(|i| node.center[i].0[k]);
+                let v = sum(&middle, &product(&motion.spin, &center));
+                let turning = motion.angle * node.radius.0[k];
+                least.0[k] = smaller(dot(normal, &v) - turning - motion.rounding, least.0[k]);
             }
         }
         least

@@ -5,11 +5,11 @@ use nalgebra::{Matrix3, Point3};
 use super::advancement::PairSearch;
 use super::collider::{Collider, Swept};
 use super::descent::for_facing_triangle_pairs;
-use super::facing_volumes::FacingVolumes;
 use super::gaps::Gaps;
 use super::impact::AdvancementSettings;
 use super::motion::{Motion, Placement, RelativeMotion};
 use super::problem::Problem;
+use super::still_pair::StillPair;
 use super::turned::TurnedNodes;
 use super::work::Work;
 use crate::geometry::wide_tree::{Child, WideTree};
@@ -96,11 +96,12 @@ impl Problem<'_> {
         (stack, turned): (&mut Vec<(Child, Child)>, &mut TurnedNodes),
         work: &mut Work,
     ) -> bool {
-        let (trees, start) = (self.trees(leaves), self.relative.at(0.0));
-        let volumes = FacingVolumes::still(trees, &start, 0.0, std::f64::consts::PI, turned);
+        let start = self.relative.at(0.0);
+        let both = (&self.body, &self.obstacle);
+        let still = StillPair::new(both, &start, (0.0, std::f64::consts::PI), leaves, turned);
         let mut meets = false;
         let (any, memory) = (|_, _| true, (stack, turned));
-        for_facing_triangle_pairs(trees, &volumes, memory, work, any, |a, b, _| {
+        for_facing_triangle_pairs(&still, memory, work, any, |a, b, _| {
             meets = search.meets(&self.pair(a, b), &start);
             !meets
         });

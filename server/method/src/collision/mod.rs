@@ -27,6 +27,7 @@ mod problem;
 #[cfg(test)]
 mod processors_tests;
 mod single;
+mod still_pair;
 mod time_of_impact;
 mod turned;
 mod turning;
@@ -42,15 +43,15 @@ pub use time_of_impact::time_of_impact;
 pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
-pub(crate) use bands::{Bands, for_nearest_triangle_pairs};
+pub(crate) use bands::for_nearest_triangle_pairs;
 pub(crate) use collider::distance_at_least;
 pub(crate) use deepest::for_deepest_triangle_pairs;
 pub(crate) use descent::for_facing_triangle_pairs;
 pub(crate) use displacements::{MAX_MOTIONS, Motions};
-pub(crate) use facing_volumes::{FacingVolumes, Side};
+pub(crate) use facing_volumes::Side;
 pub(crate) use motion::Placement;
 pub(crate) use obstacle_way::{ObstacleWay, time_of_impact_of_obstacle};
 #[cfg(test)]
 pub(crate) use processors_tests::bumpy_ball;
-pub(crate) use turned::TurnedNodes;
+pub(crate) use still_pair::StillPair;
 pub(crate) use workspace::{MAX_IMPLIED, MAX_WITNESSES};

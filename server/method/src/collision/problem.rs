@@ -31,17 +31,6 @@ impl Problem<'_> {
         }
     }
 
-    /// The primitive that a mesh is searched against, and whose the mesh is.
-    pub(super) fn primitive(&self) -> Option<(&Primitive, Side)> {
-        match (&self.body, &self.obstacle) {
-            (Collider::Mesh(_), Collider::Primitive(primitive)) => Some((primitive, Side::Body)),
-            (Collider::Primitive(primitive), Collider::Mesh(_)) => {
-                Some((primitive, Side::Obstacle))
-            }
-            _ => None,
-        }
-    }
-
     /// The trees of both; `leaves` become those of primitives.
     pub(super) fn trees<'t>(
         &'t self,
@@ -53,21 +42,33 @@ impl Problem<'_> {
             self.relative.length(self.radius) + 2.0 * self.radius,
         );
         (
-            self.body.tree(body, reached),
-            self.obstacle.tree(obstacle, reached),
+            self.body.tree(body, reached, false),
+            self.obstacle.tree(obstacle, reached, false),
         )
     }
 }
 
-/// Whether the mesh's volume of a pair stays beyond a primitive in an interval. The primitive is on one side of the plane through its point nearest to the
+/// The primitive that a mesh is searched against, and whose the mesh is.
+pub(super) fn primitive_of<'a>(
+    body: &Collider<'a>,
+    obstacle: &Collider<'a>,
+) -> Option<(&'a Primitive, Side)> {
+    match (*body, *obstacle) {
+        (Collider::Mesh(_), Collider::Primitive(primitive)) => Some((primitive, Side::Body)),
+        (Collider::Primitive(primitive), Collider::Mesh(_)) => Some((primitive, Side::Obstacle)),
+        _ => None,
+    }
+}
+
+/// By how much more than the margin the mesh's volume of a pair stays apart from a primitive in an interval at least, m. The primitive is on one side of the plane through its point nearest to the
 /// volume's centre; the volume is on the other while the centre's distance exceeds its extent and what the interval adds. Boxes say little of what is round.
 #[inline]
-pub(super) fn stays_beyond(
+pub(super) fn beyond_primitive(
     (primitive, side): (&Primitive, Side),
     volumes: &FacingVolumes,
     trees: (&WideTree, &WideTree),
     pair: (Child, Child),
-) -> bool {
+) -> f64 {
     let (tree, child, other) = match side {
         Side::Body => (trees.0, pair.0, trees.1),
         Side::Obstacle => (trees.1, pair.1, trees.0),
@@ -78,5 +79,5 @@ pub(super) fn stays_beyond(
     let radius = f64::from(tree.radius(child));
     let in_mesh = volumes.frame(side).turn.tr_mul(&nearest.normal);
     let extent = tree.extent(child, &in_mesh).min(radius);
-    nearest.distance > extent + added.along(&nearest.normal, radius) // false for NaN
+    nearest.distance - (extent + added.along(&nearest.normal, radius))
 }

@@ -9,7 +9,6 @@ use super::intervals::{Intervals, MAX_HALVINGS};
 use super::known_apart::KnownApart;
 use super::turned::TurnedNodes;
 use crate::constraint::Contact;
-use crate::geometry::MAX_DEPTH;
 use crate::geometry::wide_tree::WideTree;
 
 /// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
@@ -64,8 +63,6 @@ impl Memory {
 #[derive(Clone, Debug)]
 pub struct CollisionWorkspace {
     pub(crate) pairs: Vec<(u32, u32)>,
-    /// Nodes of one tree that wait.
-    pub(crate) nodes: Vec<u32>,
     pub(crate) bands: Bands,
     pub(super) agenda: Agenda,
     /// Pairs that found no room on the agenda, and what lies below them.
@@ -76,7 +73,7 @@ pub struct CollisionWorkspace {
     pub(crate) current: usize,
     pub(crate) turned: TurnedNodes,
     /// Of primitives, the body's and the obstacle's, in the search under way.
-    pub(super) leaves: [WideTree; 2],
+    pub(crate) leaves: [WideTree; 2],
     pub(crate) candidates: Vec<Contact>,
     /// Of those that others imply.
     pub(crate) implied: Vec<Contact>,
@@ -101,7 +98,6 @@ impl CollisionWorkspace {
     pub fn with_candidates(candidates: usize) -> Self {
         Self {
             pairs: Vec::with_capacity(WIDE_STACK_CAPACITY),
-            nodes: Vec::with_capacity(MAX_DEPTH + 2),
             bands: Bands::new(Default::default()),
             agenda: Agenda::new(Waiting::UNUSED),
             // Each pair opened may have been cut into its shortest interval before.

@@ -3,24 +3,23 @@
 //! Both trees are descended together, by distance and by cones of normals: surfaces that do not face each other are left
 //! early. Each vertex and edge belongs to one triangle, so that a pair of features is looked at once.
 
-use arrayvec::ArrayVec;
-
 use super::cones::LOOK_AHEAD_TILT;
-use super::element::{Element, Frame, Placed, Row};
+use super::element::Row;
 use super::facing::{Facing, Reach, point_face, point_point, point_segment, rows, segment_segment};
 use super::nearest::{Nearest, Rows};
-use super::piece::elements_of;
+use super::piece::{Piece, Triangle};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
-    Bands, Collider, CollisionWorkspace, FacingVolumes, MAX_IMPLIED, MAX_WITNESSES, Placement,
-    TurnedNodes, Work, for_facing_triangle_pairs, for_nearest_triangle_pairs,
+    Collider, CollisionWorkspace, MAX_IMPLIED, MAX_WITNESSES, Placement, StillPair, Work,
+    for_facing_triangle_pairs, for_nearest_triangle_pairs,
 };
-use crate::geometry::wide_tree::Child;
-use crate::geometry::{Mesh, Node};
+use crate::geometry::Mesh;
 use crate::spatial::Pose;
 
 /// The bits of owned features that stand for corners; those of sides follow.
 const CORNERS: u8 = 7;
+/// The piece of a primitive.
+const ONLY_PIECE: u32 = 0;
 
 /// Appends every contact within `activation_distance` (m) to `out`, nearest first, as many as its capacity has room for.
 ///
@@ -83,30 +82,31 @@ pub(crate) fn collect_bounded(
             [2 * MAX_IMPLIED, MAX_IMPLIED],
             activation_distance,
         ),
-        obstacle: obstacle_index,
     };
     let (mut looked_at, mut complete_within) = (0, activation_distance);
-    if placement.is_beyond(activation_distance, body, obstacle) {
-        // Nothing to look at.
-    } else if let (Collider::Mesh(body), Collider::Mesh(obstacle)) = (body, obstacle) {
+    if !placement.is_beyond(activation_distance, body, obstacle) {
+        let turned = &mut workspace.turned;
+        let within = (activation_distance, LOOK_AHEAD_TILT);
+        let leaves = &mut workspace.leaves;
+        let still = StillPair::new((&body, &obstacle), &placement, within, leaves, turned);
         let reach = Reach::new(activation_distance);
-        let facing = Facing::new(body, obstacle, &placement, obstacle_index, reach);
+        let mut facing = Facing::new(body, obstacle, &placement, obstacle_index, reach);
         let look = |a, b, work: &mut Work| {
             let before = work.feature_pairs;
-            for_contacts(&facing, [a, b], work, |contact| rows.nearest.take(contact));
+            facing.reach.implied_within = rows.implied.within;
+            for_contacts(&facing, [a, b], work, |contact, implied| {
+                rows.take(contact, implied);
+            });
             looked_at += 1 + work.feature_pairs - before;
             looked_at < pairs
         };
-        let bounded = pairs < u64::MAX;
-        let queues = (
-            &mut workspace.pairs,
-            &mut workspace.bands,
-            &mut workspace.turned,
-        );
-        complete_within = for_pairs_of_triangles(&facing, &placement, bounded, queues, work, look);
-    } else {
-        let stack = &mut workspace.nodes;
-        looked_at = for_pieces((&body, &obstacle), &placement, &mut rows, stack, work);
+        if pairs < u64::MAX {
+            let memory = (&mut workspace.bands, turned);
+            complete_within = for_nearest_triangle_pairs(&still, memory, work, can_touch, look);
+        } else {
+            let memory = (&mut workspace.pairs, turned);
+            for_facing_triangle_pairs(&still, memory, work, can_touch, look);
+        }
     }
     let truncated = rows.finish();
     let candidates = &workspace.candidates;
@@ -115,9 +115,7 @@ pub(crate) fn collect_bounded(
     }
     let gap_min = candidates.first().map_or(f64::INFINITY, |c| c.gap);
     out.extend(candidates.iter().map(|c| in_world(c, obstacle_pose)));
-    if let (Collider::Mesh(body), Collider::Mesh(_)) = (body, obstacle) {
-        note_witnesses(body, workspace);
-    }
+    note_witnesses((&body, &obstacle), workspace);
     Collected {
         truncated,
         complete_within,
@@ -126,105 +124,24 @@ pub(crate) fn collect_bounded(
     }
 }
 
-/// Calls `look` for the pairs of triangles that may face each other, the nearest first where that is bounded, until it returns false. The distance within
-/// which every such pair was looked at, m.
-fn for_pairs_of_triangles(
-    facing: &Facing,
-    placement: &Placement,
-    bounded: bool,
-    (stack, bands, turned): (&mut Vec<(Child, Child)>, &mut Bands, &mut TurnedNodes),
-    work: &mut Work,
-    look: impl FnMut(u32, u32, &mut Work) -> bool,
-) -> f64 {
-    let trees = (
-        facing.body.mesh.wide_tree(),
-        facing.obstacle.mesh.wide_tree(),
-    );
-    let distance = facing.reach.within;
-    let volumes = FacingVolumes::still(trees, placement, distance, LOOK_AHEAD_TILT, turned);
-    if bounded {
-        let volumes = (&volumes, distance);
-        for_nearest_triangle_pairs(trees, volumes, (bands, turned), work, can_touch, look)
-    } else {
-        for_facing_triangle_pairs(trees, &volumes, (stack, turned), work, can_touch, look);
-        distance
-    }
-}
-
-/// Takes the rows where a primitive is on one side or on both; the number of pairs that were looked at. A primitive is a tree of one piece: that of a mesh
-/// is descended against it, by the plane through its nearest point to a box's centre, across the line between them. The convex primitive is on one side of
-/// it, and the box on the other while its centre's distance exceeds its extent along that line.
-fn for_pieces(
-    (body, obstacle): (&Collider<'_>, &Collider<'_>),
-    placement: &Placement,
-    found: &mut Rows,
-    stack: &mut Vec<u32>,
-    work: &mut Work,
-) -> u64 {
-    let (of_body, of_obstacle) = (Frame(Some(placement)), Frame(None));
-    let within = found.nearest.within;
-    let mut reach = Reach::new(within);
-    let (mesh, frame, primitive, elements, to_primitive) = match (*body, *obstacle) {
-        (Collider::Primitive(a), Collider::Primitive(b)) => {
-            work.feature_pairs += 1;
-            for x in &elements_of(a, of_body) {
-                for y in &elements_of(b, of_obstacle) {
-                    rows(x, y, &reach, &mut |row| found.take(&row, None));
-                }
-            }
-            return 1;
-        }
-        (Collider::Mesh(mesh), Collider::Primitive(b)) => {
-            (mesh, of_body, b, elements_of(b, of_obstacle), *placement)
-        }
-        (Collider::Primitive(a), Collider::Mesh(mesh)) => {
-            let to_body = placement.inverse();
-            (mesh, of_obstacle, a, elements_of(a, of_body), to_body)
-        }
-        (Collider::Mesh(_), Collider::Mesh(_)) => return 0,
-    };
-    let (mesh_moves, placed) = (frame.0.is_some(), Placed { mesh, frame });
-    let (mut nodes, mut triangles) = (0, 0);
-    let may_meet = |node: &Node| {
-        nodes += 1;
-        let nearest = primitive.nearest(&to_primitive.point(&node.center));
-        let in_mesh = to_primitive.rotation.tr_mul(&nearest.normal).abs();
-        let apart = nearest.distance > in_mesh.dot(&node.half) + within; // false for NaN
-        !apart
-    };
-    mesh.tree().for_triangles(stack, may_meet, |t| {
-        triangles += 1;
-        let triangle = placed.triangle(t);
-        let on_obstacle = (!mesh_moves).then_some(&triangle);
-        let near = |x: &&Element| match x {
-            Element::Circle(rim) => rim.may_be_near(&triangle.corners, within),
-            _ => true,
-        };
-        let near: ArrayVec<&Element, 5> = elements.iter().filter(near).collect();
-        reach.implied_within = found.implied.within;
-        triangle.for_elements(|y| {
-            for x in &near {
-                let (first, second) = if mesh_moves { (y, *x) } else { (*x, y) };
-                rows(first, second, &reach, &mut |row| {
-                    found.take(&row, on_obstacle)
-                });
-            }
-        });
-        true
-    });
-    work.node_pairs += nodes;
-    work.triangle_pairs += triangles;
-    work.feature_pairs += triangles;
-    2 * triangles
-}
-
 /// The next search looks at the nearest candidates first.
-fn note_witnesses(body: &Mesh, workspace: &mut CollisionWorkspace) {
+fn note_witnesses(
+    (body, obstacle): (&Collider<'_>, &Collider<'_>),
+    workspace: &mut CollisionWorkspace,
+) {
     let witnesses = &mut workspace.memories[workspace.current].witnesses;
     witnesses.clear();
     for contact in workspace.candidates.iter().take(MAX_WITNESSES) {
-        if let Some(triangle) = triangle_of(body, contact.features.on_body) {
-            witnesses.push((triangle, contact.obstacle_triangle));
+        let on_body = match body {
+            Collider::Mesh(mesh) => triangle_of(mesh, contact.features.on_body),
+            Collider::Primitive(_) => Some(ONLY_PIECE),
+        };
+        let on_obstacle = match obstacle {
+            Collider::Mesh(_) => contact.obstacle_triangle,
+            Collider::Primitive(_) => ONLY_PIECE,
+        };
+        if let Some(on_body) = on_body {
+            witnesses.push((on_body, on_obstacle));
         }
     }
 }
@@ -236,16 +153,51 @@ pub(super) fn can_touch(on_a: u8, on_b: u8) -> bool {
     (on_a | on_b) & CORNERS != 0 || (on_a != 0 && on_b != 0)
 }
 
-/// Every contact between features that the two triangles own, or that one owns with the other's face.
+/// Every contact between features that two pieces own, or that one owns with the other's face, and whether others imply it.
 pub(super) fn for_contacts(
     facing: &Facing,
     [a, b]: [u32; 2],
     work: &mut Work,
+    mut found: impl FnMut(Contact, bool),
+) {
+    let (body, obstacle) = (facing.body.piece(a), facing.obstacle.piece(b));
+    let index = facing.obstacle_index;
+    match (&body, &obstacle) {
+        (Piece::Triangle(a), Piece::Triangle(b)) => {
+            for_contacts_of_triangles(facing, (a, b), work, |contact| found(contact, false));
+        }
+        _ => {
+            work.feature_pairs += 1;
+            for_rows_of_primitive(&body, &obstacle, &facing.reach, &mut |row: Row| {
+                found(row.contact(index, obstacle.triangle()), row.implied);
+            });
+        }
+    }
+}
+
+/// The rows of two pieces, one of which is a primitive.
+fn for_rows_of_primitive(
+    body: &Piece,
+    obstacle: &Piece,
+    reach: &Reach,
+    found: &mut dyn FnMut(Row),
+) {
+    let of_body = body.near(obstacle, reach.within);
+    let of_obstacle = obstacle.near(body, reach.within);
+    body.for_elements(&of_body, |x| {
+        obstacle.for_elements(&of_obstacle, |y| rows(x, y, reach, found));
+    });
+}
+
+/// The same of two triangles.
+fn for_contacts_of_triangles(
+    facing: &Facing,
+    (a, b): (&Triangle, &Triangle),
+    work: &mut Work,
     mut found: impl FnMut(Contact),
 ) {
-    let (a, b) = (facing.body.triangle(a), facing.obstacle.triangle(b));
     let reach = &facing.reach;
-    let mut hand_on = |row: Row| found(row.contact(facing.obstacle_index, Some(&b)));
+    let mut hand_on = |row: Row| found(row.contact(facing.obstacle_index, Some(b)));
     let (on_a, on_b) = (a.owned(), b.owned());
     let (corners_a, corners_b) = (on_a & CORNERS, on_b & CORNERS);
     let (sides_a, sides_b) = (on_a >> 3, on_b >> 3);

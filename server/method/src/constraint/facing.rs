@@ -17,11 +17,10 @@ use super::collect::triangle_of;
 use super::cones::{LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE};
 use super::element::{Cone, Element, Face, Frame, Placed, Point, Row, Segment, Skin};
 use super::foot::past_end;
-use super::piece::{Triangle, elements_of};
+use super::piece::{Pieces, Triangle, elements_of};
 use super::reentrant::{covers_outline, covers_way};
 use super::{Contact, Feature, FeaturePair};
 use crate::collision::{Collider, Placement};
-use crate::geometry::Mesh;
 
 /// Segments at a smaller angle are parallel, as its sine: their ends stand for them.
 pub(super) const PARALLEL_SINE: f64 = 1e-6;
@@ -225,29 +224,25 @@ pub(super) fn rows(a: &Element, b: &Element, reach: &Reach, found: &mut dyn FnMu
 }
 
 /// Looks at features of one body and one obstacle at rest.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct Facing<'a> {
-    pub(super) body: Placed<'a>,
-    pub(super) obstacle: Placed<'a>,
+    pub(super) body: Pieces<'a>,
+    pub(super) obstacle: Pieces<'a>,
     pub(super) obstacle_index: u16,
     pub(super) reach: Reach,
 }
 
 impl<'a> Facing<'a> {
     pub(super) fn new(
-        body: &'a Mesh,
-        obstacle: &'a Mesh,
+        body: impl Into<Collider<'a>>,
+        obstacle: impl Into<Collider<'a>>,
         placement: &'a Placement,
         obstacle_index: u16,
         reach: Reach,
     ) -> Self {
-        let placed = |mesh, frame| Placed {
-            mesh,
-            frame: Frame(frame),
-        };
         Self {
-            body: placed(body, Some(placement)),
-            obstacle: placed(obstacle, None),
+            body: Pieces::of(body.into(), Frame(Some(placement))),
+            obstacle: Pieces::of(obstacle.into(), Frame(None)),
             obstacle_index,
             reach,
         }

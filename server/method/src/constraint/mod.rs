@@ -24,7 +24,7 @@ pub use collect::collect_contacts;
 pub(crate) use collect::{collect_bounded, in_world};
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
-pub(crate) use reduction::{At, Place, Purpose, RowReduction, Surfaces, Wished};
+pub(crate) use reduction::{At, Purpose, RowReduction, Surfaces, Wished};
 pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};
 pub(crate) use violated::{Violated, for_violated};

@@ -1,25 +1,22 @@
 //! The nearest of many rows.
 
 use super::Contact;
-use super::element::Row;
-use super::piece::Triangle;
 
 /// Where rows go: the nearest, and of those that others imply.
 pub(super) struct Rows<'a> {
     pub(super) nearest: Nearest<'a>,
     pub(super) implied: Nearest<'a>,
-    pub(super) obstacle: u16,
 }
 
 impl Rows<'_> {
-    /// Takes a row whose first is the body.
-    pub(super) fn take(&mut self, row: &Row, on_obstacle: Option<&Triangle>) {
-        let rows = if row.implied {
+    #[inline]
+    pub(super) fn take(&mut self, contact: Contact, implied: bool) {
+        let rows = if implied {
             &mut self.implied
         } else {
             &mut self.nearest
         };
-        rows.take(row.contact(self.obstacle, on_obstacle));
+        rows.take(contact);
     }
 
     /// Leaves them in the nearest; whether some were left out.

@@ -11,7 +11,11 @@ use super::arc::Arc;
 use super::circle::Circle;
 use super::collect::for_bits;
 use super::element::{Cone, Element, Extent, Face, Frame, Placed, Point, Segment, Skin};
+use crate::collision::Collider;
 use crate::geometry::{Primitive, across, unit_axis};
+
+/// Most elements of a primitive.
+const MAX_ELEMENTS: usize = 5;
 
 /// A triangle of a mesh.
 #[derive(Clone, Copy, Debug)]
@@ -132,8 +136,75 @@ impl<'a> Triangle<'a> {
     }
 }
 
+/// The pieces of a collider.
+#[derive(Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "on the stack, in a search that allocates nothing"
+)]
+pub(super) enum Pieces<'a> {
+    Triangles(Placed<'a>),
+    /// The elements of its only one.
+    One(ArrayVec<Element<'a>, MAX_ELEMENTS>),
+}
+
+/// One of them.
+pub(super) enum Piece<'a> {
+    Triangle(Triangle<'a>),
+    Primitive(&'a [Element<'a>]),
+}
+
+impl<'a> Pieces<'a> {
+    pub(super) fn of(collider: Collider<'a>, frame: Frame<'a>) -> Self {
+        match collider {
+            Collider::Mesh(mesh) => Self::Triangles(Placed { mesh, frame }),
+            Collider::Primitive(primitive) => Self::One(elements_of(primitive, frame)),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn piece(&self, t: u32) -> Piece<'_> {
+        match self {
+            Self::Triangles(placed) => Piece::Triangle(placed.triangle(t)),
+            Self::One(elements) => Piece::Primitive(elements),
+        }
+    }
+}
+
+impl Piece<'_> {
+    pub(super) fn triangle(&self) -> Option<&Triangle<'_>> {
+        match self {
+            Self::Triangle(triangle) => Some(triangle),
+            Self::Primitive(_) => None,
+        }
+    }
+
+    /// The elements of a primitive that may be within `reach` (m) of another piece; none of a triangle.
+    pub(super) fn near(&self, other: &Self, reach: f64) -> ArrayVec<&Element<'_>, MAX_ELEMENTS> {
+        let is_near = |element: &&Element| match (element, other.triangle()) {
+            (Element::Circle(rim), Some(triangle)) => rim.may_be_near(&triangle.corners, reach),
+            _ => true,
+        };
+        match self {
+            Self::Triangle(_) => ArrayVec::new(),
+            Self::Primitive(elements) => elements.iter().filter(is_near).collect(),
+        }
+    }
+
+    /// Calls `each` for what a triangle owns, and its face; or for the elements of a primitive that are `near`.
+    pub(super) fn for_elements(&self, near: &[&Element], mut each: impl FnMut(&Element)) {
+        match self {
+            Self::Triangle(triangle) => triangle.for_elements(each),
+            Self::Primitive(_) => near.iter().for_each(|element| each(element)),
+        }
+    }
+}
+
 /// What of a primitive can touch.
-pub(super) fn elements_of<'a>(primitive: &Primitive, frame: Frame<'_>) -> ArrayVec<Element<'a>, 5> {
+pub(super) fn elements_of<'a>(
+    primitive: &Primitive,
+    frame: Frame<'_>,
+) -> ArrayVec<Element<'a>, MAX_ELEMENTS> {
     let skin = |round, cone, feature| Skin {
         round,
         cone,

@@ -7,9 +7,10 @@ use super::collect::{can_touch, for_contacts, in_world};
 use super::cones::LOOK_AHEAD_TILT;
 use super::facing::{Facing, Reach};
 use crate::collision::{
-    CollisionWorkspace, FacingVolumes, Motions, Placement, Side, Work, for_deepest_triangle_pairs,
+    Collider, CollisionWorkspace, Motions, Placement, Side, StillPair, Work,
+    for_deepest_triangle_pairs,
 };
-use crate::geometry::Mesh;
+use crate::geometry::Primitive;
 use crate::spatial::{Pose, Vector6};
 
 /// What a search for violated pairs asks.
@@ -31,8 +32,8 @@ pub(crate) struct Violated<'a> {
 /// Calls `found` for contacts, world frame, among which are all that one of the motions would bring below the target: the deepest first, to a band, as
 /// many as the work allows.
 pub(crate) fn for_violated(
-    (body, body_pose): (&Mesh, &Pose),
-    (obstacle, obstacle_pose): (&Mesh, &Pose),
+    (body, body_pose): (Collider<'_>, &Pose),
+    (obstacle, obstacle_pose): (Collider<'_>, &Pose),
     obstacle_index: u16,
     asked: &Violated<'_>,
     workspace: &mut CollisionWorkspace,
@@ -43,36 +44,35 @@ pub(crate) fn for_violated(
     if placement.is_beyond(asked.reach, body, obstacle) {
         return;
     }
-    let trees = (body.wide_tree(), obstacle.wide_tree());
-    let volumes = FacingVolumes::still(
-        trees,
-        &placement,
-        asked.reach,
-        LOOK_AHEAD_TILT,
-        &mut workspace.turned,
-    );
+    let turned = &mut workspace.turned;
+    let within = (asked.reach, LOOK_AHEAD_TILT);
+    let leaves = &mut workspace.leaves;
+    let still = StillPair::new((&body, &obstacle), &placement, within, leaves, turned);
     let reach = Reach::new(asked.reach);
     let facing = Facing::new(body, obstacle, &placement, obstacle_index, reach);
-    let seen_by = |side, placed| {
+    let seen_by = |side, pose| {
+        let placed = (still.tree(side), pose);
         Motions::seen_by(side, placed, asked.motions, &asked.center, LOOK_AHEAD_TILT)
     };
-    let of_body = seen_by(Side::Body, (trees.0, body_pose));
-    let of_obstacle = seen_by(Side::Obstacle, (trees.1, obstacle_pose));
+    let mut of_body = seen_by(Side::Body, body_pose);
+    if let Collider::Primitive(Primitive::Plane { normal, .. }) = obstacle {
+        of_body = of_body.along(&-placement.rotation.tr_mul(normal));
+    }
+    let of_obstacle = seen_by(Side::Obstacle, obstacle_pose);
     let mut looked_at = 0;
     for_deepest_triangle_pairs(
-        trees,
-        (&volumes, asked.reach),
+        &still,
         (
             [&of_body, &of_obstacle],
             asked.known_within as f32,
             asked.target as f32,
         ),
-        (&mut workspace.bands, &mut workspace.turned),
+        (&mut workspace.bands, turned),
         work,
         can_touch,
         |a, b, work| {
             let before = work.feature_pairs;
-            for_contacts(&facing, [a, b], work, |contact| {
+            for_contacts(&facing, [a, b], work, |contact, _| {
                 found(&in_world(&contact, obstacle_pose));
             });
             looked_at += 1 + work.feature_pairs - before;
@@ -89,6 +89,7 @@ mod tests {
 
     use super::*;
     use crate::constraint::{FeaturePair, collect_contacts, contact_jacobian};
+    use crate::geometry::Mesh;
     use crate::spatial::six;
 
     const ROUGH: f64 = 1e-6;
@@ -142,7 +143,10 @@ mod tests {
             let world = Pose::new(Vector3::new(u, -u, 0.1 * u), Vector3::y() * (0.2 * u));
             let slid = Vector3::new(1e-4 * (1.7 * u).sin(), 1e-4 * (2.3 * u).cos(), 6e-6);
             let body_pose = world * Pose::new(slid, Vector3::z() * (0.3 * u).sin());
-            let placed = [(&body, &body_pose), (&obstacle, &world)];
+            let placed = [
+                (Collider::from(&body), &body_pose),
+                (Collider::from(&obstacle), &world),
+            ];
             let center = body_pose * Point3::new(1e-3, 2e-3, -3e-3);
             // Along the surfaces, and a little about axes in them.
             let motions = [0.0, 1.0].map(|shift| {

@@ -42,6 +42,9 @@ const STRIP_SHARE: f64 = 0.1;
 /// The tangent of a volume above is of use where so much of it is left across the axis.
 const LEAST_TANGENT: f64 = 0.5;
 
+/// Features of all kinds, as the bits of [`Mesh::owned_features`](crate::Mesh::owned_features).
+const ALL_FEATURES: u8 = 63;
+
 /// What a child of a node of the wide tree holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Volume {
@@ -57,7 +60,7 @@ pub(crate) struct Volume {
     pub(crate) cosine: f32,
     pub(crate) sine: f32,
     /// Which kinds of features the triangles inside own, as the bits of [`Mesh::owned_features`](crate::Mesh::owned_features).
-    pub(super) owned: u8,
+    pub(crate) owned: u8,
 }
 
 impl Volume {
@@ -86,7 +89,7 @@ impl Volume {
             radius: wider(radius),
             cosine: -1.0,
             sine: 0.0,
-            owned: 0,
+            owned: ALL_FEATURES,
         }
     }
 }

@@ -6,8 +6,8 @@ use crate::constraint::{At, Collected, RowReduction, collect_bounded};
 
 impl GodObject {
     /// The facing pairs within `distance`, m; every obstacle has its share of the work. Where some need more than last time, those that come after
-    /// have what these leave, and at least what each would have if all that are near had the same. First come those that needed the least, and of
-    /// these the nearest, so that the order of the scene says nothing.
+    /// have what these leave, and at least what each would have if all that are near had the same. First come the nearest, so that the order of the
+    /// scene says nothing.
     pub(super) fn collect_candidates(
         &mut self,
         reduction: &mut RowReduction,
@@ -20,7 +20,6 @@ impl GodObject {
         let share = self.share();
         let (mut left, mut even) = (self.settings.look_ahead_pairs, None);
         self.note_order(at);
-        let mut of_primitives = 0;
         for place in 0..self.order.len() {
             let index = self.order[place];
             let pairs = if left < share {
@@ -32,27 +31,23 @@ impl GodObject {
             let collected = self.candidates_of(index, at, (distance, pairs), work);
             left = left.saturating_sub(collected.looked_at.min(pairs));
             self.looked_at[index] = collected.looked_at;
+            self.nearest[index] = collected.gap_min.min(collected.complete_within);
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
-            let first = reduction.offer(at, index, &self.contacts, &collected);
-            if !at.places[index].meshes {
-                of_primitives += collected.looked_at;
-                reduction.take_nearest((at, &self.surfaces(None)), first);
-            }
+            reduction.offer(at, index, &self.contacts, &collected);
         }
-        self.afford_look_ahead(distance, of_primitives);
         // Known rows may be nearer than what a collection that was given up has found.
         let gap_min = reduction.gap_min(at, work);
         self.set.gap_min = self.set.gap_min.min(gap_min);
     }
 
-    /// Sorts the obstacles by what their last collection took, then by how far their origins are from the body.
+    /// Sorts the obstacles by how near their last collection left them, then by how far their origins are from the body.
     fn note_order(&mut self, at: &At) {
         let body = &at.reference.translation.vector;
-        let off = |index: usize| (at.places[index].pose.translation.vector - body).norm();
-        let looked_at = &self.looked_at;
+        let off = |index: usize| (at.places[index].translation.vector - body).norm();
+        let nearest = &self.nearest;
         self.order.sort_unstable_by(|a, b| {
-            let needed = looked_at[*a].cmp(&looked_at[*b]);
-            let nearer = needed.then_with(|| off(*a).total_cmp(&off(*b)));
+            let nearer = nearest[*a].total_cmp(&nearest[*b]);
+            let nearer = nearer.then_with(|| off(*a).total_cmp(&off(*b)));
             nearer.then(a.cmp(b))
         });
     }

@@ -32,15 +32,11 @@ impl GodObject {
             return;
         };
         for (index, (place, placed)) in places.iter_mut().zip(&self.obstacles).enumerate() {
-            if place.pose == placed.pose {
+            if *place == placed.pose {
                 continue;
             }
-            let path = placed.length(&pose_difference(
-                &placed.pose,
-                &place.pose,
-                &Vector3::zeros(),
-            ));
-            place.pose = placed.pose;
+            let path = placed.length(&pose_difference(&placed.pose, place, &Vector3::zeros()));
+            *place = placed.pose;
             if let Some(reduction) = &mut self.reduction {
                 reduction.note_moved(index, path);
             }
@@ -59,7 +55,7 @@ impl GodObject {
         };
         for (index, (place, placed)) in places.iter_mut().zip(&self.obstacles).enumerate() {
             if placed.is_with_body() {
-                place.pose = placed.pose;
+                *place = placed.pose;
             } else {
                 reduction.note_moved(index, path);
             }

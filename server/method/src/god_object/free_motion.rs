@@ -16,7 +16,7 @@ impl GodObject {
         let settings = Self::advancement(&self.settings);
         let (mut free, mut stopped) = (1.0, None);
         // What is near comes first: the others need to be searched only up to where it stops the body.
-        for index in self.order.iter().rev().copied() {
+        for index in self.order.iter().copied() {
             let (obstacle, placed) = (&self.world.obstacles[index], &self.obstacles[index]);
             if goes_along(placed) {
                 continue;

@@ -30,7 +30,8 @@ impl GodObject {
     /// The choice of rows; `None` for the paper's cone, which has every touching contact.
     pub(super) fn reduction_for(world: &World, settings: &Settings) -> Option<Box<RowReduction>> {
         let room = settings.max_constraints;
-        (settings.look_ahead).then(|| Box::new(RowReduction::with_capacity(room, world)))
+        (settings.look_ahead)
+            .then(|| Box::new(RowReduction::with_capacity(room, world.obstacles.len())))
     }
 
     /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
@@ -107,7 +108,7 @@ impl GodObject {
         let all = self.with_reduction(|this, reduction, at| {
             let surfaces = this.surfaces(None);
             reduction.set_surfaces(at, &surfaces);
-            let all = reduction.take_all((at, &surfaces)) && !reduction.was_given_up();
+            let all = reduction.take_nearest((at, &surfaces)) && !reduction.was_given_up();
             (all, reduction.has_meshes(at))
         });
         let probes = self.probes(difference, reach);

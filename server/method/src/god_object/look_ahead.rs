@@ -1,4 +1,4 @@
-//! How far a published set looks ahead, and what that may cost: late updates must not make later ones still later.
+//! How far a published set looks ahead. What that costs is bounded by the work of a collection: late updates must not make later ones still later.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,10 +7,6 @@ use super::substep::Update;
 use crate::collision::distance_at_least;
 use crate::spatial::{Pose, pose_difference};
 
-/// How much shorter a look-ahead becomes that costs too much, and how much longer one that costs little. A peg of 14,400 triangles led at 2 m/s along a
-/// half-space looks at 12,700 pairs in an update without this, and at 2,500 with it (`late_updates` of the tests).
-const LOOK_AHEAD_SHRINKS: f64 = 0.5;
-const LOOK_AHEAD_GROWS: f64 = 1.25;
 /// The paper's cone has touching contacts only: gaps up to this many rest distances touch.
 pub(super) const TOUCHING_REST_DISTANCES: f64 = 2.0;
 
@@ -37,7 +33,8 @@ impl GodObject {
     /// How far the set that an update publishes collects, m.
     pub(super) fn published_distance(&self, update: &Update) -> f64 {
         if self.settings.look_ahead {
-            self.settings.activation_distance + update.look_ahead.min(self.affordable)
+            self.settings.activation_distance
+                + update.look_ahead.min(self.settings.look_ahead_limit)
         } else {
             TOUCHING_REST_DISTANCES * self.settings.rest_distance
         }
@@ -54,19 +51,6 @@ impl GodObject {
             let body = &self.world.body;
             let off = distance_at_least(body, &center, obstacle, &placed.pose);
             placed.far = off > reach + placed.way(); // false for NaN
-        }
-    }
-
-    /// Takes note of what a collection within `distance` (m) beside primitives cost, in pairs of triangles and of features. Between meshes a collection
-    /// has its own bound: it reaches as far as the work allows and no less.
-    pub(super) fn afford_look_ahead(&mut self, distance: f64, pairs: u64) {
-        if pairs > self.settings.look_ahead_pairs {
-            let beyond = (distance - self.settings.activation_distance).max(0.0);
-            self.affordable = beyond.min(self.affordable) * LOOK_AHEAD_SHRINKS;
-        } else if pairs < self.settings.look_ahead_pairs / 4 {
-            self.affordable = (self.affordable * LOOK_AHEAD_GROWS)
-                .max(self.settings.activation_distance)
-                .min(self.settings.look_ahead_limit);
         }
     }
 }

@@ -207,7 +207,7 @@ impl GodObject {
     fn make_room(&mut self, share: f64, report: &mut StepReport) -> Option<f64> {
         let way = self.longest_way_left() * share;
         let distance = (2.0 * (self.settings.rest_distance + way))
-            .min(self.settings.activation_distance + self.affordable);
+            .min(self.settings.activation_distance + self.settings.look_ahead_limit);
         self.collect(distance, &mut report.work);
         for placed in &mut self.obstacles {
             placed.next = if placed.is_moving() && share < 1.0 {

@@ -58,10 +58,6 @@ impl GodObject {
         let leading = &answers[..answers.len().min(LEADING_MOTIONS)];
         let mut any = false;
         for index in 0..at.places.len() {
-            // Of a primitive every pair was collected.
-            if !at.places[index].meshes {
-                continue;
-            }
             let motions = match (reduction.conforms(at, index), purpose) {
                 (false, Purpose::Force) if reduction.has_whole_room() => answers,
                 (true, _) | (false, Purpose::Force) => leading,
@@ -112,11 +108,12 @@ impl GodObject {
             known_within,
             pairs,
         };
+        let [body, obstacle] = at.colliders(index);
         let surfaces = SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, None);
         let mut any = false;
         for_violated(
-            (&at.world.body.mesh, &at.pose),
-            at.obstacle(index),
+            body,
+            obstacle,
             u16::try_from(index).unwrap_or(u16::MAX),
             &asked,
             &mut self.collision,

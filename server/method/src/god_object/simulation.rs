@@ -11,7 +11,7 @@ use super::placed_obstacle::PlacedObstacle;
 use super::substep::{StepMemory, Update};
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};
-use crate::constraint::{ConstraintSet, Contact, Place, RowReduction};
+use crate::constraint::{ConstraintSet, Contact, RowReduction};
 use crate::implicit::ImplicitRounds;
 use crate::quasi_statics::{HalfSpace, Projector};
 use crate::settings::Settings;
@@ -72,15 +72,15 @@ pub struct GodObject {
     pub(super) impact_pairs: u64,
     /// Distance within which the present set has every row, m.
     pub(super) collected_within: f64,
-    /// Longest look-ahead that the last collections beside primitives allow by their cost, m.
-    pub(super) affordable: f64,
     /// Finds rows as they are needed; `None` for the paper's cone.
     pub(super) reduction: Option<Box<RowReduction>>,
     /// Where each obstacle is.
-    pub(super) places: Arc<[Place]>,
+    pub(super) places: Arc<[Pose]>,
     /// Pairs that the last collection of each obstacle looked at.
     pub(super) looked_at: Vec<u64>,
-    /// The obstacles, those first whose last collection looked at the fewest pairs.
+    /// No pair of each was nearer than this then, m.
+    pub(super) nearest: Vec<f64>,
+    /// The obstacles, the nearest first.
     pub(super) order: Vec<usize>,
 }
 
@@ -104,12 +104,10 @@ impl GodObject {
             places: world
                 .obstacles
                 .iter()
-                .map(|obstacle| Place {
-                    pose: obstacle.pose,
-                    meshes: world.body.primitive.is_none() && obstacle.primitive.is_none(),
-                })
+                .map(|obstacle| obstacle.pose)
                 .collect(),
             looked_at: vec![0; obstacles],
+            nearest: vec![f64::INFINITY; obstacles],
             order: (0..obstacles).collect(),
             world,
             settings,
@@ -143,7 +141,6 @@ impl GodObject {
             searched: ArrayVec::new(),
             impact_pairs: 0,
             collected_within: 0.0,
-            affordable: settings.activation_distance + settings.look_ahead_limit,
         };
         let work = &mut Work::default();
         god_object.collect(settings.activation_distance, work);

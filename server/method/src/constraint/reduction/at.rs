@@ -11,21 +11,12 @@ use crate::quasi_statics::Metric;
 use crate::spatial::{Pose, Vector6, advance_pose};
 use crate::world::World;
 
-/// Where an obstacle is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Place {
-    /// World from obstacle.
-    pub(crate) pose: Pose,
-    /// It and the body are meshes: the gaps of their pairs change to first order as the rows say, and continuous collision detection names triangles.
-    pub(crate) meshes: bool,
-}
-
 /// Where the rows are to hold.
 #[derive(Clone, Debug)]
 pub(crate) struct At {
     pub(crate) world: Arc<World>,
-    /// Of each obstacle of the world.
-    pub(crate) places: Arc<[Place]>,
+    /// World from each obstacle.
+    pub(crate) places: Arc<[Pose]>,
     pub(crate) pose: Pose,
     /// Pose of the reference point.
     pub(crate) reference: Pose,
@@ -56,13 +47,13 @@ impl At {
         let obstacle = &self.world.obstacles[index];
         [
             ((&self.world.body).into(), &self.pose),
-            (obstacle.into(), &self.places[index].pose),
+            (obstacle.into(), &self.places[index]),
         ]
     }
 
     /// An obstacle's mesh, and the world from it.
     pub(crate) fn obstacle(&self, index: usize) -> (&Mesh, &Pose) {
-        (&self.world.obstacles[index].mesh, &self.places[index].pose)
+        (&self.world.obstacles[index].mesh, &self.places[index])
     }
 }
 

@@ -55,15 +55,14 @@ impl RowReduction {
         self.served = f64::INFINITY;
     }
 
-    /// Adds contacts of one obstacle at the present pose to choose from, nearest first, world frame, complete within a distance (m); the place of the first.
+    /// Adds contacts of one obstacle at the present pose to choose from, nearest first, world frame, complete within a distance (m).
     pub(crate) fn offer(
         &mut self,
         at: &At,
         obstacle: usize,
         contacts: &[Contact],
         collected: &Collected,
-    ) -> usize {
-        let first = self.candidates.contacts.len();
+    ) {
         let room = self.candidates.room();
         for contact in contacts.iter().take(room) {
             self.candidates
@@ -83,7 +82,6 @@ impl RowReduction {
             0.0
         };
         self.served = self.served.min(within.max(searched));
-        first
     }
 
     /// Adds a contact of the present pose to choose from where one of the motions violates it, world frame; whether it does. Of the others that a search for

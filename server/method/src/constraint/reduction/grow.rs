@@ -6,11 +6,10 @@ use super::at::{At, Purpose, Surfaces};
 use super::neighbours::{for_neighbours, for_turned};
 use super::row::{Known, face};
 use super::{MAX_ROUNDS, MAX_STALE, NEAR_REST_DISTANCES, RowReduction, TOUCHING_REST_DISTANCES};
-use crate::collision::{MAX_MOTIONS, Placement, Work};
+use crate::collision::{Collider, MAX_MOTIONS, Placement, Work};
 use crate::constraint::FeaturePair;
 use crate::constraint::collect::{for_contacts, in_world};
 use crate::constraint::facing::{Facing, Reach};
-use crate::geometry::Mesh;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection};
 use crate::spatial::Vector6;
 
@@ -222,27 +221,22 @@ impl RowReduction {
         })
     }
 
-    /// Adds what faces between two triangles, of the body and of an obstacle, that stopped a motion.
+    /// Adds what faces between two pieces, of the body and of an obstacle, that stopped a motion.
     pub(super) fn take_witness(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
         (index, (a, b)): (usize, (u32, u32)),
         work: &mut Work,
     ) {
-        // What a primitive touches was collected.
-        if !at.places[index].meshes {
-            return;
-        }
-        let (obstacle, pose) = at.obstacle(index);
-        let body = &at.world.body.mesh;
-        let placement = Placement::of(&at.pose, pose);
+        let [(body, body_pose), (obstacle, pose)] = at.colliders(index);
+        let placement = Placement::of(body_pose, pose);
         let index = u16::try_from(index).unwrap_or(u16::MAX);
         let reach = Reach::new(TOUCHING_REST_DISTANCES * at.rest_distance);
         let facing = Facing::new(body, obstacle, &placement, index, reach);
         // The features that touch may be other triangles' to look at.
-        for a in owners(body, a) {
-            for b in owners(obstacle, b) {
-                for_contacts(&facing, [a, b], work, |contact| {
+        for a in owners(&body, a) {
+            for b in owners(&obstacle, b) {
+                for_contacts(&facing, [a, b], work, |contact, _| {
                     if !self.knows(&contact.features) {
                         let contact = in_world(&contact, pose);
                         self.add(Known::of(&contact, surfaces, &at.center()));
@@ -253,9 +247,12 @@ impl RowReduction {
     }
 }
 
-/// A triangle, and those that own its corners and sides; each once.
-fn owners(mesh: &Mesh, t: u32) -> ArrayVec<u32, 7> {
+/// A piece, and the triangles that own the corners and sides of one; each once.
+fn owners(collider: &Collider<'_>, t: u32) -> ArrayVec<u32, 7> {
     let mut owners = ArrayVec::from_iter([t]);
+    let Collider::Mesh(mesh) = collider else {
+        return owners;
+    };
     let corners = mesh.triangles()[t as usize].map(|v| mesh.vertex_owner(v).unwrap_or(t));
     let sides = mesh
         .triangle_edges(t)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
-use super::at::{At, Place, Purpose, Surfaces};
+use super::at::{At, Purpose, Surfaces};
 use super::grow::Wished;
 use super::row::face;
 use super::{MAX_STALE, RowReduction};
@@ -59,10 +59,7 @@ fn block_on_block(higher: f64) -> At {
     let metric = world.body.metric(RotationMetric::Inertia, &pose);
     At {
         world: Arc::new(world),
-        places: Arc::new([Place {
-            pose: Pose::from_parts(Vector3::zeros().into(), over),
-            meshes: true,
-        }]),
+        places: Arc::new([Pose::from_parts(Vector3::zeros().into(), over)]),
         pose,
         reference: pose,
         metric: metric.expect("positive definite"),
@@ -97,7 +94,7 @@ fn pairs(mesh: &Mesh) -> Vec<FeaturePair> {
 
 /// With these candidates, and no row yet.
 pub(super) fn reduction_of(at: &At, contacts: &[Contact]) -> RowReduction {
-    let mut reduction = RowReduction::with_capacity(contacts.len(), &at.world);
+    let mut reduction = RowReduction::with_capacity(contacts.len(), 1);
     let collected = Collected {
         truncated: false,
         complete_within: 1.0,

@@ -5,7 +5,7 @@ use super::at::{At, Surfaces};
 use super::row::Known;
 use crate::constraint::FeaturePair;
 
-/// So many candidates all become rows of a published set, and so many in all with what a search for the force comes across.
+/// So many candidates become rows of a published set, the nearest, and so many in all with what a search for the force comes across.
 pub(super) const FEW: usize = 64;
 /// Updates that a row outlives its last use: rows do not come and go with every tremor.
 const IDLE_UPDATES: u32 = 8;
@@ -13,33 +13,38 @@ const IDLE_UPDATES: u32 = 8;
 const IDLE_UPDATES_IMPLIED: u32 = 1;
 
 impl RowReduction {
-    /// Makes every candidate a row where they are few; false where they are many. At the pose where they were collected.
-    pub(crate) fn take_all(&mut self, (at, surfaces): (&At, &dyn Surfaces)) -> bool {
-        if self.candidates.contacts.len() > FEW.min(self.room) {
-            return false;
+    /// Makes the nearest candidates rows, a few of them, without those between conforming surfaces where there are more; whether that was all. At the pose
+    /// where they were collected.
+    pub(crate) fn take_nearest(&mut self, (at, surfaces): (&At, &dyn Surfaces)) -> bool {
+        let few = FEW.min(self.room);
+        let contacts = &self.candidates.contacts;
+        let all = contacts.len() <= few;
+        let mut nearest = std::mem::take(&mut self.nearest);
+        nearest.clear();
+        nearest.extend((0..contacts.len() as u32).filter(|k| {
+            let obstacle = contacts[*k as usize].features.obstacle;
+            all || !self.conforms(at, usize::from(obstacle))
+        }));
+        if few < nearest.len() {
+            nearest.select_nth_unstable_by(few, |a, b| {
+                let [a, b] = [a, b].map(|k| &contacts[*k as usize]);
+                a.gap
+                    .total_cmp(&b.gap)
+                    .then_with(|| a.features.cmp(&b.features))
+            });
+            nearest.truncate(few);
+            nearest.sort_unstable();
         }
         self.now += 1;
-        for k in 0..self.candidates.contacts.len() {
-            let (contact, now) = (self.candidates.contacts[k], self.now);
+        for k in &nearest {
+            let (contact, now) = (self.candidates.contacts[*k as usize], self.now);
             match self.known_mut(&contact.features) {
                 Some(row) => row.note_use(now),
                 None => self.add(Known::of(&contact, surfaces, &at.center())),
             }
         }
-        true
-    }
-
-    /// Makes candidates from this place on rows while rows are few. At the pose where they were collected.
-    pub(crate) fn take_nearest(&mut self, (at, surfaces): (&At, &dyn Surfaces), first: usize) {
-        for k in first..self.candidates.contacts.len() {
-            let contact = self.candidates.contacts[k];
-            if self.known.len() >= FEW.min(self.room) {
-                return;
-            }
-            if !self.knows(&contact.features) {
-                self.add(Known::of(&contact, surfaces, &at.center()));
-            }
-        }
+        self.nearest = nearest;
+        all
     }
 
     /// A row holds the body in an answer that was found elsewhere: friction leads to others than the wish alone.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::RowReduction;
-use super::at::{At, Place, Purpose};
+use super::at::{At, Purpose};
 use super::grow::Wished;
 use super::grow_tests::{Plain, reduction_of};
 use super::met::{are_corners, met};
@@ -46,10 +46,7 @@ fn balls(u: f64, [rings, sides]: [u32; 2]) -> At {
     let pose = Pose::new(turn(2.0).normalize() * 0.24, turn(3.0) * 2.0);
     let metric = world.body.metric(RotationMetric::Inertia, &pose);
     At {
-        places: Arc::new([Place {
-            pose: world.obstacles[0].pose,
-            meshes: true,
-        }]),
+        places: Arc::new([world.obstacles[0].pose]),
         world: Arc::new(world),
         pose,
         reference: pose,
@@ -151,7 +148,7 @@ fn turns_as_a_plane(at: &At, contact: &Contact, plane: &Contact) -> bool {
     let of_obstacle = sides(
         &at.world.obstacles[0].mesh,
         plane.features.on_obstacle,
-        &at.places[0].pose,
+        &at.places[0],
     );
     let along_edges = of_body.iter().any(|a| {
         of_obstacle.iter().any(|b| {
@@ -164,10 +161,8 @@ fn turns_as_a_plane(at: &At, contact: &Contact, plane: &Contact) -> bool {
         faces.any(|t| (mesh.face_normal(t) - direction).norm() < 1e-12)
     };
     let (body, obstacle) = (&at.world.body.mesh, &at.world.obstacles[0].mesh);
-    let of_faces = is_of(
-        obstacle,
-        at.places[0].pose.rotation.inverse() * plane.normal,
-    ) && changes(&plane.normal)
+    let of_faces = is_of(obstacle, at.places[0].rotation.inverse() * plane.normal)
+        && changes(&plane.normal)
         || is_of(body, -(at.pose.rotation.inverse() * plane.normal))
             && changes(&(turned.rotation * plane.normal));
     along_edges || of_faces
@@ -180,7 +175,7 @@ fn the_plane_that_is_named_parts_the_corners_and_is_crossed_last() {
         let at = balls(f64::from(k), [5, 6]);
         let (body, obstacle) = (&at.world.body.mesh, &at.world.obstacles[0].mesh);
         let leaves = |pair: &FeaturePair, normal: &Vector3<f64>| {
-            let on_obstacle = at.places[0].pose.rotation.inverse() * normal;
+            let on_obstacle = at.places[0].rotation.inverse() * normal;
             let on_body = -(at.pose.rotation.inverse() * normal);
             let of_obstacle = outside(obstacle, pair.on_obstacle, &on_obstacle);
             of_obstacle.max(outside(body, pair.on_body, &on_body))
@@ -214,7 +209,7 @@ fn the_plane_that_is_named_parts_the_corners_and_is_crossed_last() {
                 // Across the edge, where one is.
                 for (feature, mesh, pose) in [
                     (contact.features.on_body, body, &at.pose),
-                    (contact.features.on_obstacle, obstacle, &at.places[0].pose),
+                    (contact.features.on_obstacle, obstacle, &at.places[0]),
                 ] {
                     if let Feature::Edge(e) = feature {
                         let [p, q] = mesh.edges()[e as usize].vertices;

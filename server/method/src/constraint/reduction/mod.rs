@@ -42,14 +42,13 @@ mod row;
 
 use arrayvec::ArrayVec;
 
-pub(crate) use at::{At, Place, Purpose, Surfaces};
+pub(crate) use at::{At, Purpose, Surfaces};
 pub(crate) use grow::Wished;
 
 use super::{Contact, FeaturePair};
 use crate::collision::Work;
 use crate::quasi_statics::{HalfSpace, Projector, SolverKind};
 use crate::spatial::{Pose, Vector6};
-use crate::world::World;
 use candidates::Candidates;
 use corners::Corners;
 use passed::Passed;
@@ -83,6 +82,8 @@ pub(crate) struct RowReduction {
     room: usize,
     /// Counts projections and rows added.
     now: u64,
+    /// Places of the nearest candidates.
+    nearest: Vec<u32>,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
     /// Largest violation that a motion asked for was left with, m.
@@ -101,10 +102,9 @@ pub(crate) struct RowReduction {
 }
 
 impl RowReduction {
-    /// A reduction of this world, for at most so many rows that trees find at a time. Allocates everything that it will ever need.
-    pub(crate) fn with_capacity(candidates: usize, world: &World) -> Self {
+    /// For at most so many rows that trees find at a time, and so many obstacles. Allocates everything that it will ever need.
+    pub(crate) fn with_capacity(candidates: usize, obstacles: usize) -> Self {
         let most = MAX_ROWS + candidates;
-        let mut obstacles = world.obstacles.iter();
         Self {
             projector: Projector::new(SolverKind::ActiveSet, most),
             candidates: Candidates::with_capacity(candidates + SEARCHED),
@@ -113,15 +113,16 @@ impl RowReduction {
             known: Vec::with_capacity(MAX_ROWS),
             room: MAX_ROWS.min(candidates),
             now: 0,
+            nearest: Vec::with_capacity(candidates + SEARCHED),
             rows: Vec::with_capacity(most),
             warm_start: Vec::with_capacity(6),
             error: 0.0,
             truncated: false,
             asked: 0.0,
-            given_up_at: vec![None; world.obstacles.len()],
-            // What primitives touch is collected, and never searched for.
-            outdated: world.body.primitive.is_some() || obstacles.any(|o| o.primitive.is_some()),
-            gone: vec![0.0; world.obstacles.len()],
+            given_up_at: vec![None; obstacles],
+            // None were collected yet.
+            outdated: true,
+            gone: vec![0.0; obstacles],
             served: 0.0,
         }
     }
@@ -252,7 +253,9 @@ impl RowReduction {
             let contact = face(at, &self.candidates.contacts[k].features, false, work);
             let exact = contact.map_or(f64::INFINITY, |contact| contact.gap);
             self.candidates.gap[k] = exact;
-            self.outdated |= contact.is_none() && gap < at.rest_distance;
+            // What held the body is at the rest distance, but for rounding.
+            let held = gap < at.rest_distance + at.tolerance;
+            self.outdated |= contact.is_none() && held;
             least = least.min(exact);
         }
         least
@@ -260,8 +263,13 @@ impl RowReduction {
 
     /// Whether some row is of two meshes, whose pairs turn into others.
     pub(crate) fn has_meshes(&self, at: &At) -> bool {
-        let mut rows = self.known.iter().map(|row| row.contact.features.obstacle);
-        rows.any(|obstacle| at.places[usize::from(obstacle)].meshes)
+        let mut rows = self.known.iter().map(|row| &row.contact.features);
+        at.world.body.primitive.is_none()
+            && rows.any(|pair| {
+                at.world.obstacles[usize::from(pair.obstacle)]
+                    .primitive
+                    .is_none()
+            })
     }
 
     fn known_mut(&mut self, features: &FeaturePair) -> Option<&mut Known> {
