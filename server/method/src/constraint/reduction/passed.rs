@@ -14,65 +14,112 @@ use crate::collision::Work;
 use crate::constraint::{Contact, FeaturePair};
 use crate::spatial::Vector6;
 
-/// Most rows that are set aside for a motion: one in each round.
+/// Most rows that are set aside for a motion, that are met after that, and that count in their place.
 const MAX_PASSED: usize = MAX_ROUNDS as usize;
 
 /// Rows that are set aside for one motion.
 #[derive(Debug, Default)]
 pub(super) struct Passed {
-    known: ArrayVec<Known, MAX_PASSED>,
-    /// Places of candidates, and their gaps, m.
-    candidates: ArrayVec<(usize, f64), MAX_PASSED>,
-    /// Pairs that count in their place.
+    rows: ArrayVec<Aside, MAX_PASSED>,
+    /// Pairs that were set aside and face where the motion crosses their planes.
+    met: ArrayVec<FeaturePair, MAX_PASSED>,
+    /// Pairs that count in the place of others.
     instead: ArrayVec<FeaturePair, MAX_PASSED>,
+}
+
+/// One of them.
+#[derive(Debug)]
+struct Aside {
+    row: Known,
+    /// Its place among the candidates, and its gap, m.
+    candidate: Option<(usize, f64)>,
+    /// What it turns into was looked for.
+    turned: bool,
 }
 
 impl RowReduction {
     /// Sets rows aside that hold `motion` at a distance though it passes their pairs; `answer` is its projection. Until [`Self::bring_back_passed`].
+    ///
+    /// First all that hold it at a distance, as one may bend the way into the other; then those count that the way meets which is left.
     pub(crate) fn set_passed_aside(
         &mut self,
         of: (&At, &dyn Surfaces),
         (motion, mut answer): (&Vector6, Vector6),
         work: &mut Work,
     ) {
-        let mut nearer_than = f64::INFINITY;
         for _ in 0..MAX_ROUNDS {
-            let Some(k) = self.farthest_held(of.0, &answer, nearer_than) else {
-                return;
-            };
-            let row = self.known.swap_remove(k);
-            let (features, gap) = (row.contact.features, row.contact.gap);
-            let candidate = self.hide(&features);
-            let without = self.complete_alone(of, motion, Purpose::Motion, work);
-            let way = without.map(|projection| projection.acceleration);
-            let passed = way.and_then(|way| Some((way, passing(of.0, &row, &way, work)?)));
-            let Some((way, share)) = passed else {
-                nearer_than = gap;
-                self.show(candidate);
-                self.put_known(row);
-                continue;
-            };
-            nearer_than = f64::INFINITY;
-            answer = way;
-            let turned = self.turn_into(of, &features, (&way, share), work);
-            if turned && let Some(held) = self.complete_alone(of, motion, Purpose::Motion, work) {
-                answer = held.acceleration;
+            let changed = self.set_held_aside(of.0, &answer)
+                || self.bring_back_met(of.0, &answer, work)
+                || self.turn_passed(of, &answer, work);
+            let way = changed.then(|| self.complete_alone(of, motion, Purpose::Motion, work));
+            match way.flatten() {
+                Some(way) => answer = way.acceleration,
+                None => return,
             }
-            self.passed.known.push(row);
-            self.passed.candidates.extend(candidate);
         }
     }
 
-    /// The row with the largest gap, less than `nearer_than` (m) and more than what touches, that is tight where an answer leads: whatever the rows' order.
-    fn farthest_held(&self, at: &At, answer: &Vector6, nearer_than: f64) -> Option<usize> {
+    /// Sets the rows aside that hold an answer at a distance; whether there are any.
+    fn set_held_aside(&mut self, at: &At, answer: &Vector6) -> bool {
         let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
-        let ahead = self.known.iter().enumerate().filter(|(_, row)| {
+        let before = self.passed.rows.len();
+        let mut k = 0;
+        while k < self.known.len() && !self.passed.rows.is_full() {
+            let row = self.known[k];
+            let (features, gap) = (row.contact.features, row.contact.gap);
             let (jacobian, nearer) = row.for_purpose(Purpose::Motion);
-            let left = row.contact.gap - nearer + jacobian.dot(answer) - at.rest_distance;
-            row.contact.gap > touching && row.contact.gap < nearer_than && left <= at.tolerance
+            let left = gap - nearer + jacobian.dot(answer) - at.rest_distance;
+            let Passed { met, instead, .. } = &self.passed;
+            let counts = met.contains(&features) || instead.contains(&features);
+            if gap > touching && left <= at.tolerance && !counts {
+                let row = self.known.swap_remove(k);
+                let candidate = self.hide(&features);
+                self.passed.rows.push(Aside {
+                    row,
+                    candidate,
+                    turned: false,
+                });
+            } else {
+                k += 1;
+            }
+        }
+        self.passed.rows.len() > before
+    }
+
+    /// Lets those count again that a motion meets; whether there are any.
+    fn bring_back_met(&mut self, at: &At, motion: &Vector6, work: &mut Work) -> bool {
+        let mut rows = std::mem::take(&mut self.passed.rows);
+        let before = rows.len();
+        rows.retain(|aside| {
+            let share = crossing(at, &aside.row, motion);
+            let is_met =
+                share.is_some_and(|share| faces_at(at, &aside.row, &(motion * share), work));
+            let counts = is_met && self.passed.met.try_push(aside.row.contact.features).is_ok();
+            if counts {
+                self.show(aside.candidate);
+                self.put_known(aside.row);
+            }
+            !counts
         });
-        let farthest = ahead.max_by(|a, b| a.1.contact.gap.total_cmp(&b.1.contact.gap));
-        farthest.map(|(k, _)| k)
+        let changed = rows.len() < before;
+        self.passed.rows = rows;
+        changed
+    }
+
+    /// Adds what those turn into that a motion passes; whether there is any.
+    fn turn_passed(&mut self, of: (&At, &dyn Surfaces), motion: &Vector6, work: &mut Work) -> bool {
+        let mut any = false;
+        for k in 0..self.passed.rows.len() {
+            let aside = &mut self.passed.rows[k];
+            let Some(share) = crossing(of.0, &aside.row, motion) else {
+                continue;
+            };
+            let features = aside.row.contact.features;
+            if !std::mem::replace(&mut aside.turned, true) {
+                any |= self.turn_into(of, &features, (motion, share), work);
+            }
+        }
+        any
     }
 
     /// Takes a pair out of the candidates: its place and gap, where it is one.
@@ -83,8 +130,8 @@ impl RowReduction {
         Some((k, gap))
     }
 
-    fn show(&mut self, hidden: impl IntoIterator<Item = (usize, f64)>) {
-        for (k, gap) in hidden {
+    fn show(&mut self, hidden: Option<(usize, f64)>) {
+        if let Some((k, gap)) = hidden {
             self.candidates.gap[k] = gap;
         }
     }
@@ -122,19 +169,16 @@ impl RowReduction {
 
     /// What was set aside counts again.
     pub(crate) fn bring_back_passed(&mut self) {
-        if self.passed.known.is_empty() {
-            return;
-        }
-        let Passed {
-            known,
-            candidates,
-            instead,
-        } = std::mem::take(&mut self.passed);
+        let Passed { rows, instead, .. } = std::mem::take(&mut self.passed);
         let counts = |row: &Known| !instead.contains(&row.contact.features);
-        self.known.retain(counts);
-        self.show(candidates);
-        for row in known.into_iter().filter(counts) {
-            self.put_known(row);
+        if !instead.is_empty() {
+            self.known.retain(counts);
+        }
+        for aside in rows {
+            self.show(aside.candidate);
+            if counts(&aside.row) {
+                self.put_known(aside.row);
+            }
         }
     }
 
@@ -147,12 +191,15 @@ impl RowReduction {
     }
 }
 
-/// The share of a motion at which it crosses the plane of a row, where the pair does not face there.
-fn passing(at: &At, row: &Known, motion: &Vector6, work: &mut Work) -> Option<f64> {
+/// The share of a motion at which it crosses the plane of a row.
+fn crossing(at: &At, row: &Known, motion: &Vector6) -> Option<f64> {
     let closing = -row.jacobian.dot(motion);
     let share = (row.contact.gap - at.rest_distance) / closing;
-    let crosses = share > 0.0 && share <= 1.0; // false for NaN
-    let there = crosses.then(|| at.moved_by(&(motion * share)))?;
-    let faces = face(&there, &row.contact.features, true, work);
-    faces.is_none().then_some(share)
+    (share > 0.0 && share <= 1.0).then_some(share) // none for NaN
+}
+
+/// Whether the pair of a row faces where a motion ends.
+fn faces_at(at: &At, row: &Known, motion: &Vector6, work: &mut Work) -> bool {
+    let there = at.moved_by(motion);
+    face(&there, &row.contact.features, true, work).is_some()
 }
