@@ -69,9 +69,6 @@ impl GodObject {
                 answers = this.answers(reduction, at, &motion, Purpose::Motion, work);
             }
             let of = (at, &this.surfaces(None) as &dyn Surfaces);
-            if reduction.meet_corners(of, unconstrained, Purpose::Motion, |way| *way, work) {
-                answers = this.answers(reduction, at, &motion, Purpose::Motion, work);
-            }
             if let Some(answer) = answers.pop() {
                 reduction.set_passed_aside(of, (unconstrained, answer), work);
             }
@@ -125,7 +122,7 @@ impl GodObject {
         self.with_reduction(|this, reduction, at| {
             let continued = |way: &Vector6| this.continued(way, reach);
             let of = (at, &this.surfaces(None) as &dyn Surfaces);
-            reduction.meet_corners(of, &probes[1], Purpose::Force, continued, work);
+            reduction.meet_corners(of, &probes[1], continued, work);
         });
         if let Some(reduction) = &mut self.reduction {
             reduction.retire();

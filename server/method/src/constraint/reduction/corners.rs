@@ -1,4 +1,4 @@
-//! Pairs of corners in the way of a motion: each counts by the plane that the body would meet last.
+//! Pairs of corners in the way of the device: for the force each counts by the plane that the body would meet last.
 
 use super::RowReduction;
 use super::at::{At, Purpose, Surfaces};
@@ -32,32 +32,31 @@ impl Corners {
 }
 
 impl RowReduction {
-    /// Where a pair of corners holds back `motion`, lets each in its way count by the plane that the body would meet last; whether that changed a row.
+    /// Where a pair of corners holds back `motion`, lets each in its way count by the plane that the body would meet last.
     /// `continued` is a way as far as the motion may go on until rows are read off the pairs again: at the next pose.
     pub(crate) fn meet_corners(
         &mut self,
         of: (&At, &dyn Surfaces),
         motion: &Vector6,
-        purpose: Purpose,
         continued: impl Fn(&Vector6) -> Vector6,
         work: &mut Work,
-    ) -> bool {
+    ) {
         let mut rows = self.known.iter();
         if !rows.any(|row| are_corners(&row.contact.features)) {
-            return false;
+            return;
         }
-        let held = self.complete_alone(of, &continued(motion), purpose, work);
+        let held = self.complete_alone(of, &continued(motion), Purpose::Force, work);
         let held = held.iter().flat_map(|projection| &projection.active);
         let mut holding = held.filter_map(|row| self.known.get(row.row as usize));
         if !holding.any(|row| are_corners(&row.contact.features)) {
-            return false;
+            return;
         }
         self.forget_corners();
         self.set_corners_aside();
         // What holds the body elsewhere leads it past some of them.
-        let answers = self.complete_alone(of, motion, purpose, work);
-        let mut ways = answers.iter().map(|answer| continued(&answer.acceleration));
-        ways.any(|way| self.bring_corners_back(of, &way, work))
+        if let Some(answer) = self.complete_alone(of, motion, Purpose::Force, work) {
+            self.bring_corners_back(of, &continued(&answer.acceleration), work);
+        }
     }
 
     pub(super) fn complete_alone(
@@ -91,15 +90,9 @@ impl RowReduction {
         }
     }
 
-    /// Whether some now count by another plane.
-    fn bring_corners_back(
-        &mut self,
-        of: (&At, &dyn Surfaces),
-        way: &Vector6,
-        work: &mut Work,
-    ) -> bool {
+    /// Some now count by another plane.
+    fn bring_corners_back(&mut self, of: (&At, &dyn Surfaces), way: &Vector6, work: &mut Work) {
         let (at, surfaces) = of;
-        let mut changed = false;
         let mut instead = |contact: &Contact| {
             // A shaded surface has its own normals.
             let counts = clearance(of, contact, way) < at.rest_distance - at.tolerance
@@ -121,7 +114,6 @@ impl RowReduction {
         }
         while let Some(row) = self.corners.known.pop() {
             let met = instead(&row.contact);
-            changed |= met.is_some();
             let row = met.map_or(row, |contact| Known {
                 idle: row.idle,
                 holds: row.holds,
@@ -131,7 +123,6 @@ impl RowReduction {
             });
             self.put_known(row);
         }
-        changed || !self.corners.replaced.is_empty()
     }
 
     /// The candidates are again what was collected.

@@ -251,14 +251,21 @@ fn a_motion_that_a_pair_of_corners_holds_goes_on_by_the_plane_that_it_meets_last
         let wished = Wished {
             motions: &[way],
             turning: 0,
-            purpose: Purpose::Motion,
+            purpose: Purpose::Force,
         };
         let short_of = |reduction: &mut RowReduction, work: &mut Work| {
             let answers = reduction.complete((&at, &Plain), &wished, work);
             at.metric.norm(&(answers[0].acceleration - way))
         };
         let held = short_of(&mut reduction, work);
-        if !reduction.meet_corners((&at, &Plain), &way, Purpose::Motion, |way| *way, work) {
+        reduction.meet_corners((&at, &Plain), &way, |way| *way, work);
+        let rows = reduction.contacts();
+        let all: Vec<_> = rows.chain(&reduction.candidates.contacts).collect();
+        let is_other = |c: &&Contact| {
+            let mut collected = contacts.iter();
+            collected.any(|other| other.features == c.features && other.normal != c.normal)
+        };
+        if !all.iter().any(is_other) {
             continue;
         }
         met += 1;
