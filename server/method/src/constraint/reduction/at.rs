@@ -51,6 +51,12 @@ impl At {
         ]
     }
 
+    /// Whether the body and an obstacle are both meshes.
+    pub(crate) fn is_of_meshes(&self, index: usize) -> bool {
+        let obstacle = &self.world.obstacles[index];
+        self.world.body.primitive.is_none() && obstacle.primitive.is_none()
+    }
+
     /// An obstacle's mesh, and the world from it.
     pub(crate) fn obstacle(&self, index: usize) -> (&Mesh, &Pose) {
         (&self.world.obstacles[index].mesh, &self.places[index])

@@ -13,7 +13,7 @@ const IDLE_UPDATES: u32 = 8;
 const IDLE_UPDATES_IMPLIED: u32 = 1;
 
 impl RowReduction {
-    /// Makes the nearest candidates rows, a few of them, without those between conforming surfaces where there are more; whether that was all. At the pose
+    /// Makes the candidates rows where they are few, and otherwise the nearest few beside exact shapes that do not conform; whether that was all. At the pose
     /// where they were collected.
     pub(crate) fn take_nearest(&mut self, (at, surfaces): (&At, &dyn Surfaces)) -> bool {
         let few = FEW.min(self.room);
@@ -22,8 +22,8 @@ impl RowReduction {
         let mut nearest = std::mem::take(&mut self.nearest);
         nearest.clear();
         nearest.extend((0..contacts.len() as u32).filter(|k| {
-            let obstacle = contacts[*k as usize].features.obstacle;
-            all || !self.conforms(at, usize::from(obstacle))
+            let obstacle = usize::from(contacts[*k as usize].features.obstacle);
+            all || !(at.is_of_meshes(obstacle) || self.conforms(at, obstacle))
         }));
         if few < nearest.len() {
             nearest.select_nth_unstable_by(few, |a, b| {

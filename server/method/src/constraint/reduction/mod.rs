@@ -263,13 +263,8 @@ impl RowReduction {
 
     /// Whether some row is of two meshes, whose pairs turn into others.
     pub(crate) fn has_meshes(&self, at: &At) -> bool {
-        let mut rows = self.known.iter().map(|row| &row.contact.features);
-        at.world.body.primitive.is_none()
-            && rows.any(|pair| {
-                at.world.obstacles[usize::from(pair.obstacle)]
-                    .primitive
-                    .is_none()
-            })
+        let mut rows = self.known.iter().map(|row| row.contact.features.obstacle);
+        rows.any(|obstacle| at.is_of_meshes(usize::from(obstacle)))
     }
 
     fn known_mut(&mut self, features: &FeaturePair) -> Option<&mut Known> {
