@@ -86,7 +86,7 @@ impl<'a> Nearest<'a> {
 }
 
 /// By gap, then by features: the order says nothing of the traversal.
-fn nearer(a: &Contact, b: &Contact) -> std::cmp::Ordering {
+pub(super) fn nearer(a: &Contact, b: &Contact) -> std::cmp::Ordering {
     a.gap
         .total_cmp(&b.gap)
         .then_with(|| a.features.cmp(&b.features))

@@ -22,7 +22,7 @@
 //! | `collection.rs` | the constraint set of a pose                                                      |
 //! | `generation.rs` | rows as motions need them                                                         |
 //! | `search.rs`     | rows that are missing, where surfaces conform                                     |
-//! | `look_ahead.rs` | how far a published set looks ahead, and what that may cost                       |
+//! | `look_ahead.rs` | how far a published set looks ahead, and what is too far away to be felt          |
 //! | `obstacles.rs`  | obstacles that move, and the body out of their way                                |
 //! | `going_along.rs`| the body goes along with one of them, as one rigid body                           |
 //! | `placed_obstacle.rs` | where an obstacle is on its way                                              |

@@ -4,6 +4,7 @@ use super::RowReduction;
 use super::at::{At, Surfaces};
 use super::row::Known;
 use crate::constraint::FeaturePair;
+use crate::constraint::nearest::nearer;
 
 /// So many candidates become rows of a published set, the nearest, and so many in all with what a search for the force comes across.
 pub(super) const FEW: usize = 64;
@@ -26,12 +27,8 @@ impl RowReduction {
             all || !(at.is_of_meshes(obstacle) || self.conforms(at, obstacle))
         }));
         if few < nearest.len() {
-            nearest.select_nth_unstable_by(few, |a, b| {
-                let [a, b] = [a, b].map(|k| &contacts[*k as usize]);
-                a.gap
-                    .total_cmp(&b.gap)
-                    .then_with(|| a.features.cmp(&b.features))
-            });
+            let by_gap = |a: &u32, b: &u32| nearer(&contacts[*a as usize], &contacts[*b as usize]);
+            nearest.select_nth_unstable_by(few, by_gap);
             nearest.truncate(few);
             nearest.sort_unstable();
         }
