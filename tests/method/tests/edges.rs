@@ -288,7 +288,7 @@ fn a_ball_in_a_hollow_feels_the_facets_that_it_comes_to_in_time() {
 }
 
 /// A box and a meshed ball, turned anyhow, pass the edge of a table on straight ways, without touching it: those that are bent.
-fn bent_ways(seed: u64, ways: u32) -> Vec<String> {
+fn bent_ways(seed: u64, ways: u32, with_rods: bool) -> Vec<(f64, String)> {
     let table = mesh(cuboid([0.05, 0.05, 0.01]));
     let edge = Pose::translation(-0.05, 0.0, -0.01);
     let settings = Settings::for_size(0.02);
@@ -297,7 +297,12 @@ fn bent_ways(seed: u64, ways: u32) -> Vec<String> {
     for (shape, of_body) in [
         ("box", cuboid([0.01, 0.012, 0.008])),
         ("ball", sphere(0.01, 2)),
-    ] {
+        ("rod", cylinder(0.006, 0.02, 24, Axis::Z)),
+        ("coarse ball", sphere(0.01, 1)),
+    ]
+    .into_iter()
+    .take(if with_rods { 4 } else { 2 })
+    {
         let held = body(mesh(of_body));
         let world = Arc::new(World {
             body: held.clone(),
@@ -328,9 +333,9 @@ fn bent_ways(seed: u64, ways: u32) -> Vec<String> {
                 aside = aside.max(gone.cross(&way).norm()).max(turned);
             }
             if aside > 1e-9 {
-                pushed.push(format!(
+                pushed.push((aside, format!(
                     "{shape} {beside:.2e} beside at {speed:.1} m/s: {aside:.2e} m, off {off:?} way {way:?}"
-                ));
+                )));
             }
         }
     }
@@ -342,8 +347,20 @@ fn bent_ways(seed: u64, ways: u32) -> Vec<String> {
 fn what_passes_an_edge_goes_straight() {
     let ways = 600;
     for seed in [4, 6, 7] {
-        let bent = bent_ways(seed, ways);
+        let bent = bent_ways(seed, ways, false);
         let count = bent.len();
         assert!(bent.is_empty(), "{count} of {}: {bent:#?}", 2 * ways);
+    }
+}
+
+/// A rod is pushed aside now and then, by what its narrow faces turn into: `--no-capture` prints how often.
+#[test]
+fn a_rod_that_passes_an_edge_is_hardly_bent() {
+    let ways = 600;
+    for seed in [100, 108] {
+        let bent = bent_ways(seed, ways, true);
+        println!("{} of {}", bent.len(), 4 * ways);
+        let far: Vec<_> = bent.iter().filter(|(aside, _)| *aside > 2e-4).collect();
+        assert!(far.is_empty() && bent.len() <= 6, "{bent:#?}");
     }
 }
